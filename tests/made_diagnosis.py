@@ -83,7 +83,7 @@ def make_diagnosis(verdict: str = "found", name: str = "trial") -> Diagnosis:
         dataset=name, verdict=verdict, causes=(CAUSE,) if found else (), candidates=CANDIDATES,
         what_is_wrong=(Wrong("sway", 0.6, "heading", "worst at 90 to 135 deg"),),
         unexplained_after={"force_sd": {"surge": 0.001}},
-        extended_model="physics+current" if found else "physics", fingerprint="abc", seconds=12.0,
+        extended_model="calibrated+current" if found else "physics", fingerprint="abc", seconds=12.0,
         warnings=("few runs",),
         gain=GAIN if found else None, unknown=unknown,
         gain_per_run=(("a", 20.0, 9.0), ("b", 22.0, 10.6)) if found else (), trace=make_trace(4),

@@ -131,4 +131,4 @@ def fit_of(
 def made_analysis(final: Fit, steps: Iterable[Step] = (), threshold: float = 10.0) -> Analysis:
     """What was found, without gears and dependences."""
     selection = Selection(final, final, final, [], [], list(steps))
-    return Analysis(selection, threshold, np.zeros(0), 0.0, (), (), {}, ())
+    return Analysis(selection, threshold, np.zeros(0), 0.0, (), (), ())

@@ -26,8 +26,7 @@ from ..processes import process_pool
 from ..records import Dataset
 from ..steps import step, within
 from .candidates import describe_candidates
-from .evaluation.calibration_gain import calibration_gain
-from .evaluation.held_out_gain import FoldGain, fold_gain, summarise
+from .evaluation.held_out_gain import FoldErrors, fold_errors, of_runs, on_fitted_runs, summarise
 from .evaluation.residuals import what_is_wrong
 from .evaluation.series import trace_of
 from .explain import describe_causes, remaining, unknown_part, what_is_left
@@ -39,7 +38,7 @@ from .preparation.plant import plant_of
 from .preparation.record_errors import joined
 from .preparation.splitting import is_too_little
 from .preparation.time_offsets import ruled_out
-from .result import Cause, Diagnosis, Gain
+from .result import Calibrated, Cause, Diagnosis, Gain
 from .selection.analysis import HULL_THRESHOLD, THRESHOLD, Analysis, analyse, causes_of, plain_model
 from .selection.ship_file import doubts_of, odd_for, own_propeller
 from .thresholds import THRESHOLDS
@@ -96,7 +95,7 @@ def _diagnosed(
     with process_pool(workers) if wanted and workers > 1 else nullcontext() as pool:
         # the first part is fitted beside the whole, which takes longer: the other cores would be idle until it is known
         # whether anything is measured
-        ahead = pool.submit(work, 0, THRESHOLD, True) if pool and only is None else None
+        ahead = pool.submit(work, 0, THRESHOLD) if pool and only is None else None
         step("fit the plain model", 0.02, whole)
         null = plain_model(plant_of(dataset, steps), only, settled)
         step("look for causes", whole, 2.0 * whole)
@@ -111,23 +110,16 @@ def _diagnosed(
                 ahead, work = None, partial(work, dataset=dataset, settled=no_cause)
         doubts = doubts_of(found) if only is None and rests else []
         share = used.part(folds)
-        if not wanted or is_spent():
-            worth = Worth()
-        elif doubts:
-            worth = Worth(
-                told=(
-                    "no gain is measured while the ship file is in doubt: correct it, or confirm it, and diagnose "
-                    "again.",
-                )
-            )
-        else:
-            worth = _cross_validated(dataset, found, seed, partial(work, budget=share), pool, ahead)
+        worth = Worth()
+        if wanted and not is_spent():
+            worth = _cross_validated(dataset, found, bool(doubts), seed, partial(work, budget=share), pool, ahead)
     lines = warnings + used.said(nothing=not rests) + list(worth.told)
     lines += [text for text, _ in standing(dataset).values()] + _of_depth(dataset, null.plant) + doubts
     lines += own_propeller(found) + left_out(found.selection.null.plant, dataset.runs) + misread.said(found.misread)
     causes = describe_causes(
-        found, units, ready.late, worth.gain, worth.hull, bool(doubts), [r.id for r in dataset.runs]
-    )
+        found, units, ready.late, worth.gain, worth.own if worth.hull else None, bool(doubts),
+        [r.id for r in dataset.runs],
+    )  # fmt: skip
     changes = {e.name for e in searched_by("change")}
     lines += [
         f"{c.effect}: {c.evidence} Fit the runs before it and from it on separately."
@@ -139,31 +131,55 @@ def _diagnosed(
     lines += what_is_left(found) if causes and not doubts else []
     lines += odd_for(found, [c.effect for c in causes]) if only is None and not doubts else []
     step("predict every run", 0.96, 1.0)
-    trace = trace_of(dataset, found, worth.hull)
+    trace = trace_of(dataset, found)
     unknown = (bool(doubts) and not causes) or (found.unknown is not None and not units)
     verdict = "unknown" if unknown else "found" if causes else "none"
-    names = [c.effect for c in causes if not (EFFECTS.get(c.effect).traits.describes_data or c.effect in behind)]
+    own = worth.calibration or (on_fitted_runs(dataset, found.selection.null, seed) if rests else None)
+    gain = worth.own if worth.hull and len(causes) == 1 else worth.gain
+    proposed = _proposed([c.effect for c in causes if c.effect not in behind], own)
     return Diagnosis(
         dataset=dataset.name, verdict=verdict, causes=tuple(causes),
-        candidates=tuple(describe_candidates(found, [c.effect for c in causes], worth.gain is not None)),
+        candidates=tuple(describe_candidates(found, [c.effect for c in causes], worth.own is not None)),
         what_is_wrong=what_is_wrong(trace),
         unexplained_after=remaining(found) | {"taken_as_noise": noise_in_words(found.final)},
-        extended_model="+".join(["physics", *names]), fingerprint=fingerprint, seconds=time.perf_counter() - began,
-        warnings=tuple(lines), gain=worth.gain if causes else None, unknown=unknown_part(found),
+        extended_model=proposed, fingerprint=fingerprint, seconds=time.perf_counter() - began,
+        warnings=tuple(lines), gain=gain if causes else None, unknown=unknown_part(found),
         gain_per_run=worth.per_run if causes else (), trace=trace,
-        calibration=calibration_gain(dataset, found.selection.null) if rests else None,
+        calibration=own,
     )  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Worth:
-    """Held-out gain, ED of every run before and after [m], whether naming the hull's derivatives is justified, and
-    lines for the reader."""
+    """Errors on held-out runs as statements.
 
+    Attributes:
+        calibration: errors of the ship file's model and of the calibrated ship.
+        gain: of the causes beside the calibrated ship; None where there are none.
+        own: of calibrating the ship, over the ship file's model.
+        per_run: ED of every run before and after that gain [m].
+        hull: whether naming the ship's own coefficients as a cause is justified.
+        told: lines for the reader.
+    """
+
+    calibration: Calibrated | None = None
     gain: Gain | None = None
+    own: Gain | None = None
     per_run: tuple[tuple[str, float, float], ...] = ()
     hull: bool = False
     told: tuple[str, ...] = ()
+
+
+def _proposed(causes: Sequence[str], calibration: Calibrated | None) -> str:
+    """Spec of the model that is proposed: the calibrated ship with the causes that a predictor can have, or `physics`
+    where there are none and calibrating the ship does not pay.
+
+    The coefficients of the hull are calibrated already, and errors of the record are to be corrected.
+    """
+    traits = {name: EFFECTS.get(name).traits for name in causes}
+    names = [name for name, t in traits.items() if not t.describes_data and t.search != "hull"]
+    pays = calibration is not None and calibration.after < calibration.before
+    return "+".join(["calibrated", *names]) if names or pays else "physics"
 
 
 def _as_it_must_be_read(
@@ -216,22 +232,23 @@ def _of_depth(dataset: Dataset, plant: Plant) -> list[str]:
 @threadpool_limits.wrap(limits=1)  # a process of its own
 def _one_fold(
     fold: int,
-    threshold: float,
-    hull: bool,
+    threshold: float | None,
     *,
     dataset: Dataset,
     seed: int,
     only: Sequence[str] | None,
     settled: Sequence[str],
     budget: Budget,
-) -> FoldGain:
-    """Selection and fits on the training part of one fold, within a part of the budget of the whole."""
+) -> FoldErrors:
+    """Selection (none where the threshold is None) and fits on the training part of one fold, within a part of the
+    budget of the whole."""
     test = _folds(dataset, seed)[fold]
     train = [r for i, r in enumerate(dataset.runs) if i not in set(test.tolist())]
     plant = plant_of(dataset.with_runs(train), FOLD_STEPS)
     with limited(Budget(budget.iterations, budget.seconds, budget.gigabytes)) as used:
-        extension, plain = causes_of(plant, threshold, only, settled)
-        return replace(fold_gain(dataset, test, extension, plain, hull), stopped=used.is_spent)
+        null = plain_model(plant, () if threshold is None else only, settled)
+        final, gears = (null, {}) if threshold is None else causes_of(null, threshold, only)
+        return replace(fold_errors(dataset, test, null, final, gears), stopped=used.is_spent)
 
 
 def _folds(dataset: Dataset, seed: int) -> list[np.ndarray]:
@@ -279,21 +296,22 @@ def _behind_its_record(found: Analysis, causes: Sequence[Cause]) -> dict[str, st
 def _cross_validated(
     dataset: Dataset,
     found: Analysis,
+    doubts: bool,
     seed: int,
-    work: Callable[..., FoldGain],
+    work: Callable[..., FoldErrors],
     pool: Executor | None,
-    ahead: Future[FoldGain] | None,
+    ahead: Future[FoldErrors] | None,
 ) -> Worth:
-    """Held-out gain of the causes, and of the hull's derivatives beside them; ahead: the first part, as it is with the
-    usual threshold."""
-    hull = found.hull > HULL_THRESHOLD
-    if not (found.final.model.terms or found.gears or hull) or found.unknown is not None:
-        return Worth()
-    ready = [ahead] if ahead is not None and found.threshold == THRESHOLD else []
+    """Errors on held-out runs; ahead: the first part, as it is with the usual threshold.
+
+    Where nothing is named, or the ship file is in doubt, nothing is looked for in the training parts either.
+    """
+    named = bool(found.final.model.terms or found.gears) and found.unknown is None and not doubts
+    ready = [ahead] if ahead is not None and (not named or found.threshold == THRESHOLD) else []
     folds, rest = THRESHOLDS.count("folds"), range(len(ready), len(_folds(dataset, seed)))
-    parts: list[FoldGain] = []
+    parts: list[FoldErrors] = []
     step(f"fit {folds} training parts, score the runs left out", 2.0 * _WHOLE, 0.96)
-    for part in (pool.map if pool else map)(partial(work, threshold=found.threshold, hull=hull), rest):
+    for part in (pool.map if pool else map)(partial(work, threshold=found.threshold if named else None), rest):
         parts.append(part)
         within(len(parts) / (len(rest) + len(ready)))
     parts += [part.result() for part in ready]
@@ -301,12 +319,19 @@ def _cross_validated(
         return Worth(
             told=(f"no gain is measured: {stopped} of {len(parts)} training parts were stopped by the limit on work.",)
         )
-    before, after, with_hull = (np.zeros(len(dataset)) for _ in range(3))
-    for part in parts:
-        before[part.test], after[part.test], with_hull[part.test] = part.before, part.after, part.with_hull
+    order = np.argsort(np.concatenate([part.test for part in parts]))
+    file, own, after, on_regressions, own_hull = (
+        np.concatenate([getattr(part, name) for part in parts])[order]
+        for name in ("file", "calibrated", "with_causes", "on_regressions", "own_hull")
+    )
     groups = [run.group for run in dataset.runs]
-    name_hull = hull and summarise(after, with_hull, seed, groups).ci95[0] > 0.0
-    if name_hull:
-        after = with_hull
+    of_ship, hulls = (summarise(*pair, seed, groups) for pair in ((file, own), (on_regressions, own_hull)))
+    calibration = of_runs(dataset, file, own, seed)
+    if doubts:
+        told = "no gain is measured while the ship file is in doubt: correct it, or confirm it, and diagnose again."
+        return Worth(calibration, told=(told,))
+    name_hull = found.hull > HULL_THRESHOLD and found.unknown is None and hulls.ci95[0] > 0.0
+    before, after = (own, after) if named else (file, own)
     rows = tuple((run.id, float(b), float(a)) for run, b, a in zip(dataset.runs, before, after, strict=True))
-    return Worth(summarise(before, after, seed, groups), rows, name_hull)
+    gain = summarise(own, after, seed, groups) if named else None
+    return Worth(calibration, gain, of_ship, rows if named or name_hull else (), name_hull)

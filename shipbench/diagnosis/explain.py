@@ -20,7 +20,7 @@ from .evaluation.run_values import goes_with, of_runs
 from .preparation.time_offsets import LateVelocities, late_effects, late_velocities_effect
 from .result import Cause, Estimate, Gain, what_it_is
 from .selection.agreement import covariance, inflation
-from .selection.analysis import HULL_THRESHOLD, Analysis
+from .selection.analysis import Analysis
 from .selection.ship_file import whatever_the_ship
 from .selection.stepwise import CONFUSED
 from .selection.unknown import Dependence
@@ -31,7 +31,7 @@ def describe_causes(
     units: Sequence[UnitFinding],
     late: LateVelocities | None,
     gain: Gain | None,
-    hull: bool,
+    own: Gain | None,
     doubt: bool,
     runs: Sequence[str],
 ) -> list[Cause]:
@@ -39,7 +39,8 @@ def describe_causes(
     because most ships differ from the regressions.
 
     No cause is listed in whose place an unknown one is reported. In doubt about the ship file an unknown force may be
-    due to that; causes that do not depend on the ship file are then listed. `runs` are their names.
+    due to that; causes that do not depend on the ship file are then listed. gain: of the causes on held-out runs; own:
+    of the ship's own coefficients, None where these are no cause; runs: their names.
     """
     causes = [_unit_cause(i + 1, u) for i, u in enumerate(units)]
     if late is not None:
@@ -60,8 +61,8 @@ def describe_causes(
         named[0] = replace(named[0], evidence=_sentences([named[0].evidence, other]))
     if doubt:
         named = [c for c in named if whatever_the_ship(c.effect, found)]
-    if hull and found.hull > HULL_THRESHOLD:
-        named.append(_hull_cause(found, gain))
+    if own is not None:
+        named.append(_hull_cause(found, own))
     return causes + [replace(c, rank=len(causes) + i + 1) for i, c in enumerate(named)]
 
 

@@ -24,12 +24,18 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Calibrated:
-    """Mean position error [m] of open-loop rollouts of the fitted runs: of the ship file's model, and with the ship's
-    own coefficients calibrated; seconds: longest rollout."""
+    """Mean position error ED [m] of open-loop rollouts: `before`, of the ship file's model, and `after`, with the
+    ship's own coefficients calibrated.
+
+    ci95: interval of `after` over runs. seconds: longest rollout. held_out: whether every run was predicted by a model
+    that was fitted to others.
+    """
 
     before: float
     after: float
+    ci95: tuple[float, float]
     seconds: float
+    held_out: bool
 
 
 @dataclass(frozen=True)
@@ -186,7 +192,8 @@ class Diagnosis:
         }  # fmt: skip
 
     def _calibration(self, found: Calibrated) -> dict[str, Any]:
-        return _plain({"metric": "ED", "on": "fitted runs", **asdict(found)})
+        on = "held-out runs" if found.held_out else "fitted runs"
+        return _plain({"metric": "ED", "on": on, **{k: v for k, v in asdict(found).items() if k != "held_out"}})
 
 
 def _plain(value: Any) -> Any:

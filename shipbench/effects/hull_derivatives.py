@@ -14,7 +14,7 @@ from .traits import Traits
 class HullDerivatives(Effect):
     family = "hull"
     summary = "hull derivatives that differ from the regressions"
-    phrase = "hull coefficients that differ from the regressions"
+    phrase = "the ship's own coefficients"
     source = (
         "Clarke, Gedling & Hine (1983): scatter of measured derivatives about the regressions; "
         "docs/theory.md#coefficients-of-the-left-side"

@@ -13,10 +13,12 @@ from itertools import pairwise
 import numpy as np
 
 from .baseline import from_regressions
+from .budget import is_spent
 from .coefficients import NUM_BASE
 from .forward import Plant
 from .gauss_newton import Origin, fit
-from .laplace import Fit, Model, base_precision
+from .gram import solve
+from .laplace import Fit, Model, base_precision, with_hull
 from .linearisation import Linearisation, Scales
 from .open_loop import cost, errors, rolled, sizes
 from .robust_prior import widened
@@ -100,14 +102,29 @@ def calibrated(plant: Plant, like: Fit, terms: Sequence[Term] = ()) -> Fit:
 
 
 def calibration_of(found: Fit) -> Calibration:
-    """Estimates, their covariance and the random parts of a fit."""
-    size = NUM_BASE + sum(t.size for t in found.model.terms)
+    """Estimates, their covariance and the random parts of a fit; without values of single runs, which a run that was
+    not seen does not have."""
+    shared = [(t, v) for t, v in zip(found.model.terms, found.values, strict=True) if not t.per_run]
+    size = NUM_BASE + sum(t.size for t, _ in shared)
     hyper, scales = found.hyper, found.scales
     pushes = Pushes(np.exp(0.5 * hyper.log_force) * scales.w, hyper.tau, np.exp(0.5 * hyper.log_noise) * scales.noise)
     return Calibration(
         found.solution.mean[:NUM_BASE], found.solution.cov[:size, :size],
-        np.asarray(found.model.widths or np.ones(NUM_BASE)), pushes, found.model.terms, found.values,
+        np.asarray(found.model.widths or np.ones(NUM_BASE)), pushes, tuple(t for t, _ in shared),
+        tuple(v for _, v in shared),
     )  # fmt: skip
+
+
+def calibration_without(found: Fit, runs: Sequence[int]) -> Calibration:
+    """Calibration by the other runs than `runs` (indices), on the linearisation of `found`, a fit to all."""
+    keep, reduced = ~np.isin(np.arange(found.plant.seg.runs), runs), found.reduced
+    rest = replace(reduced, S=reduced.S[keep], logdet=reduced.logdet[keep])
+    return calibration_of(replace(found, solution=solve(rest, found.prior)))
+
+
+def calibration_on_regressions(found: Fit) -> Calibration:
+    """Calibration with a hull that follows the regressions, on the linearisation of `found`."""
+    return calibration_of(replace(found, solution=with_hull(found, THRESHOLDS.value("hull_on_regressions"))))
 
 
 def _parts(at: np.ndarray, terms: Sequence[Term]) -> tuple[np.ndarray, ...]:
@@ -127,6 +144,8 @@ def refined(plant: Plant, scales: Scales, start: Calibration) -> Calibration:
     lin = rolled(plant, scales, start)
     weights, before = _weights(lin), np.inf
     for _ in range(_REFINEMENTS):
+        if is_spent():
+            break
         at = _stacked(start)
         old = cost(lin, weights) + float(free @ at**2)
         if old > (1.0 - _LEAST_GAIN) * before:

@@ -332,14 +332,16 @@ def evidence_with(found: Fit, colour: Colour) -> float:
 def hull_evidence(found: Fit) -> float:
     """Return 2 log evidence for a hull that differs from the regressions as ships usually do, against one that follows
     them."""
-    products = found.products.without(sum(t.size for t in found.candidates))
+    follows = with_hull(found, THRESHOLDS.value("hull_on_regressions"))
+    return 2.0 * (with_hull(found, 1.0).log_evidence - follows.log_evidence)
 
-    def with_hull(width: float) -> float:
-        model = replace(found.model, hull=width)
-        hyper, log_tau2 = _variances(products, model, found.hyper, found.log_tau2, _EM_CYCLES)
-        return solve(products.weigh(hyper).reduce(hyper.log_force), model.prior(log_tau2)).log_evidence
 
-    return 2.0 * (with_hull(1.0) - with_hull(THRESHOLDS.value("hull_on_regressions")))
+def with_hull(found: Fit, width: float) -> Solution:
+    """Posterior on the same linearisation with the prior standard deviations of the hull times `width`, and with all
+    variances fitted anew."""
+    products, model = found.products.without(sum(t.size for t in found.candidates)), replace(found.model, hull=width)
+    hyper, log_tau2 = _variances(products, model, found.hyper, found.log_tau2, _EM_CYCLES)
+    return solve(products.weigh(hyper).reduce(hyper.log_force), model.prior(log_tau2))
 
 
 def settled_evidence(found: Fit, products: Products, more: int) -> float:

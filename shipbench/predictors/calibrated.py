@@ -19,24 +19,15 @@ import numpy as np
 from ..effects.base import flow_first
 from ..errors import InputError, WorkError
 from ..estimation.actuator_fit import fit_actuators
-from ..estimation.calibration import (  # fmt: skip
-    Calibration,
-    Pushes,
-    calibrated,
-    calibration_of,
-    estimated,
-    refined,
-    some_of,
-)
+from ..estimation.calibration import Calibration, Pushes, calibrated, calibration_of, estimated, some_of
 from ..estimation.coefficients import FREE, NUM_BASE, NUM_HULL, ShipScales, hull_changes, parameters
 from ..estimation.extension import ACTUATOR_OF, Extension, measured, true_start
 from ..estimation.extension import Active as Acting
-from ..estimation.forward import MOST_STEPS, Plant, known_effects
+from ..estimation.forward import Plant, known_effects
 from ..estimation.gears import fit_gears, gears_of
 from ..estimation.laplace import Fit
-from ..estimation.linearisation import Scales
-from ..estimation.open_loop import distance, rollout_plant
 from ..estimation.priors import PRIORS
+from ..estimation.refinement import refined_on, refinement_length
 from ..estimation.rollout import Active, Course, Vessel
 from ..estimation.term import Given, Term
 from ..physics.actuators import Gear, gear_path
@@ -47,8 +38,6 @@ from ._saved import check_shapes
 from .base import History
 from .physics_model.fitted_ship import ACTUATOR_PARAMETERS, FittedShip
 
-_PIECES = (60.0, 240.0)
-"""Lengths of rollouts [s] that are tried in the refinement, for a ship of 130 m (Froude-scaled)."""
 _UNKNOWN = 0.9
 """Posterior over prior standard deviation above which runs hold next to no information about a coefficient."""
 
@@ -103,12 +92,10 @@ class Calibrated(FittedShip):
         self.shallow = bool(plant.water)
         self.gears = self._fit_gears(data, plant)
         first = self._first(some_of(Plant.of(train)))
-        seconds = self._refinement(train, valid, calibration_of(first)) if self.refine and valid is not None else None
-        model = calibration_of(calibrated(plant, first, first.model.terms))
-        if seconds is not None:
-            rolled = rollout_plant(data, self.gears, seconds)
-            rolled = rolled.thinned(max(len(data), MOST_STEPS // (rolled.steps * rolled.substeps)))
-            model = refined(rolled, Scales(rolled), model)
+        seconds = None
+        if self.refine and valid is not None:
+            seconds = refinement_length(train, valid, self.gears, calibration_of(first))
+        model = refined_on(data, self.gears, seconds, calibration_of(calibrated(plant, first, first.model.terms)))
         if not np.isfinite(model.base).all():
             raise WorkError(
                 f"the calibration of '{train.name}' found no finite estimate; check units and signs with `shipbench "
@@ -159,24 +146,6 @@ class Calibrated(FittedShip):
         """Effects of the spec that are found from the motion; gears are where the record has the commands alone."""
         terms = () if self.extension is None else self.extension.terms
         return [t for t in terms if self.commanded or t.effect.enters != "gear"]
-
-    def _refinement(self, train: Dataset, valid: Dataset, start: Calibration) -> float | None:
-        """Length of the rollouts [s] whose refinement of a first estimate predicts the validation runs best; None where
-        no gain exceeds its standard error over these runs (the rule of one standard error), as of a single run.
-
-        As few rollouts take part as pieces in the estimate.
-        """
-        if len(valid) < 2:
-            return None
-        froude = (self.particulars.L / 130.0) ** 0.5
-        test = rollout_plant(valid, self.gears, _PIECES[-1] * froude)
-        before, gains = distance(test, Scales(test), start)[0], {}
-        for seconds in (froude * piece for piece in _PIECES):
-            plant = some_of(rollout_plant(train, self.gears, seconds))
-            gain = before - distance(test, Scales(test), refined(plant, Scales(plant), start))[0]
-            if gain.mean() > gain.std(ddof=1) / np.sqrt(len(gain)):
-                gains[seconds] = gain.mean()
-        return max(gains, key=gains.__getitem__, default=None)
 
     def _take(self, model: Calibration) -> None:
         """Keep a calibration, and put the amplitudes of its terms into the extension."""

@@ -8,7 +8,7 @@ from made_fits import made_analysis, made_fit
 
 from shipbench.diagnosis import diagnose as whole
 from shipbench.diagnosis.diagnose import diagnose
-from shipbench.diagnosis.evaluation.held_out_gain import FoldGain
+from shipbench.diagnosis.evaluation.held_out_gain import FoldErrors
 from shipbench.diagnosis.preparation import time_offsets as clocks
 from shipbench.diagnosis.selection import analysis
 from shipbench.diagnosis.selection import stepwise as selection
@@ -123,15 +123,13 @@ def test_noise_is_not_looked_for_after_the_limit(turned, monkeypatch):
 
 
 def test_no_gain_is_measured_with_a_training_part_that_was_stopped(turned):
-    def work(fold: int, threshold: float, hull: bool) -> FoldGain:
+    def work(fold: int, threshold: float | None) -> FoldErrors:
         test = whole._folds(turned, 0)[fold]
-        return FoldGain(
-            test, np.ones(len(test)), np.zeros(len(test)), np.zeros(len(test)), ("heading_bias",), stopped=fold == 1
-        )
+        return FoldErrors(test, *np.ones((5, len(test))), stopped=fold == 1)
 
     found = made_analysis(made_fit((Term(EFFECTS.get("heading_bias")),)))
-    worth = whole._cross_validated(turned, found, 0, work, None, None)
-    assert (worth.gain, worth.per_run) == (None, ())
+    worth = whole._cross_validated(turned, found, False, 0, work, None, None)
+    assert (worth.gain, worth.calibration, worth.per_run) == (None, None, ())
     assert "1 of 5 training parts were stopped" in worth.told[0]
 
 

@@ -1,37 +1,39 @@
-"""Held-out gain of identified causes: open-loop rollouts of held-out runs.
+"""Errors of three models on held-out runs: the ship file's, the calibrated ship's, and the same with the causes.
 
-Selection and fits are repeated on every training part.
+They are fitted to the training runs of a fold alone, in the way of the predictor `calibrated`, and scored by the
+benchmark's ED.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 
-from ...estimation.between_ships import STRUCTURE
-from ...estimation.budget import is_spent
-from ...estimation.coefficients import FREE, NUM_BASE, NUM_HULL
-from ...estimation.forward import Plant
-from ...estimation.linearisation import Point, Scales
-from ...estimation.open_loop import Rollout, cost, distance, errors, rolled, rollout_plant, sizes
-from ...estimation.term import Term
+from ...estimation.actuator_fit import fit_actuators
+from ...estimation.calibration import (
+    Calibration,
+    calibration_of,
+    calibration_on_regressions,
+    calibration_without,
+)
+from ...estimation.coefficients import NUM_BASE
+from ...estimation.gears import gears_of
+from ...estimation.laplace import Fit
+from ...estimation.linearisation import Scales
+from ...estimation.open_loop import OpenLoop, Rollout, distance, rollout_plant
+from ...estimation.refinement import refined_on, refinement_length
 from ...physics.actuators import Gear
 from ...records import Dataset
-from ..result import Gain
+from ..result import Calibrated, Gain
 from ..thresholds import THRESHOLDS
 
-
-@dataclass(frozen=True)
-class Extension:
-    """Addition to the baseline model by a diagnosis: terms with first guesses, the hull, changed actuator dynamics."""
-
-    terms: tuple[Term, ...] = ()
-    values: tuple[np.ndarray, ...] = ()
-    hull: bool = False
-    gears: dict[str, Gear] | None = None
+_VALIDATION = 9
+"""Groups of training runs of which one decides whether rollouts refine a calibration, as in `shipbench run`."""
+_DRAWS = 2000
+AS_IN_FILE = Rollout(np.zeros(NUM_BASE), (), ())
+"""The ship file's model: every coefficient at its prior mean."""
 
 
 def horizon(L: float) -> float:
@@ -39,106 +41,114 @@ def horizon(L: float) -> float:
     return THRESHOLDS.value("run_duration") * (L / 130.0) ** 0.5
 
 
-def plain_base() -> np.ndarray:
-    """Base parameters of eq. (2) alone: the differences of `Structure` are removed, so that "before" is the plain
-    physics model."""
-    base = np.zeros(NUM_BASE)
-    base[len(FREE) + NUM_HULL :] = STRUCTURE.plain()
-    return base
-
-
-def fit_rollout(plant: Plant, scales: Scales, extension: Extension) -> Rollout:
-    """Least squares of whole rollouts over p, the identified effects (and the hull where it is named), with weak
-    priors.
-
-    Channels are weighted by the root mean square of the error before the fit, positions as one: the spread that the
-    model must explain. Once the time budget is spent, the current fit is returned.
-    """
-    free = list(range(len(FREE) + (NUM_HULL if extension.hull else 0)))
-    terms = tuple(t for t in extension.terms if not t.per_run)  # a run that was not seen has no value of its own
-    start = tuple(v for t, v in zip(extension.terms, extension.values, strict=True) if not t.per_run)
-    lin = rolled(plant, scales, Rollout(plain_base(), terms, start))
-    weights = np.tile(1.0 / np.maximum(sizes(lin), lin.scales.noise), lin.plant.steps + 1)
-    for _ in range(8):
-        if is_spent():
-            break
-        base, own = lin.parameter_columns(free)
-        J = np.concatenate([base, *own], axis=-1) * weights[None, :, None]
-        J = J * np.repeat(plant.seg.mask, 6, axis=1)[..., None]
-        e = errors(lin) * weights
-        ok = np.isfinite(J).all(axis=(1, 2)) & np.isfinite(e).all(axis=1)
-        at = np.concatenate([lin.point.base[free], *lin.point.values]) if terms else lin.point.base[free]
-        prior = np.ones(len(at))
-        step = np.linalg.solve(
-            np.einsum("bti,btj->ij", J[ok], J[ok]) + np.diag(prior),
-            np.einsum("bti,bt->i", J[ok], e[ok]) - prior * (at - _centre(free, terms)),
-        )
-        share, old = 1.0, cost(lin, weights)
-        while True:
-            trial = rolled(plant, scales, _moved(lin.point, free, terms, at + share * step))
-            if cost(trial, weights) < old or share < 0.1:
-                break
-            share *= 0.5
-        if cost(trial, weights) > 0.999 * old:
-            break
-        lin = trial
-    return Rollout(lin.point.base, terms, lin.point.values)
-
-
-def _centre(free: Sequence[int], terms: Sequence[Term]) -> np.ndarray:
-    return np.concatenate([plain_base()[list(free)], np.zeros(sum(t.size for t in terms))])
-
-
-def _moved(point: Point, free: Sequence[int], terms: Sequence[Term], at: np.ndarray) -> Rollout:
-    base = point.base.copy()
-    base[list(free)] = at[: len(free)]
-    sizes = np.cumsum([len(free), *(t.size for t in terms)])
-    return Rollout(base, tuple(terms), tuple(at[a:b] for a, b in pairwise(sizes)))
-
-
 @dataclass(frozen=True)
-class FoldGain:
-    """Errors ED [m] of the test runs: of the baseline model, with the causes, and with the hull's derivatives fitted as
-    well; the causes of the training runs, and whether the budget stopped their selection."""
+class FoldErrors:
+    """Errors ED [m] of the held-out runs of a fold.
+
+    Attributes:
+        test: indices of the runs.
+        file: errors of the ship file's model.
+        calibrated: of the calibrated ship.
+        with_causes: of the calibrated ship with the causes of the training runs.
+        on_regressions: with the causes and a hull that follows the regressions, without refinement on rollouts;
+            own_hull: the same with the calibrated hull.
+        stopped: whether the budget ended the fits.
+    """
 
     test: np.ndarray
-    before: np.ndarray
-    after: np.ndarray
-    with_hull: np.ndarray
-    names: tuple[str, ...]
+    file: np.ndarray
+    calibrated: np.ndarray
+    with_causes: np.ndarray
+    on_regressions: np.ndarray
+    own_hull: np.ndarray
     stopped: bool = False
 
 
-def fold_gain(dataset: Dataset, test: np.ndarray, extension: Extension, plain: dict[str, Gear], hull: bool) -> FoldGain:
-    """Fit the plain model, the extended one (and that with the hull) to the training runs alone, and roll all out on
-    the test runs."""
+def fold_errors(dataset: Dataset, test: np.ndarray, null: Fit, final: Fit, gears: dict[str, Gear]) -> FoldErrors:
+    """Errors of the held-out runs.
+
+    Args:
+        test: indices of the held-out runs.
+        null: baseline model of the other runs.
+        final: the same with their causes.
+        gears: actuator dynamics that are causes, by actuator.
+    """
     inside = set(test.tolist())
-    part = dataset.with_runs([r for i, r in enumerate(dataset.runs) if i not in inside])
-    rest = dataset.with_runs([r for i, r in enumerate(dataset.runs) if i in inside])
-    seconds = horizon(dataset.ship.L)
-    plant, held = rollout_plant(part, plain, seconds), rollout_plant(rest, plain, seconds)
-    scales = Scales(plant)
-    before, _ = distance(held, scales, fit_rollout(plant, scales, Extension()))
-    names = tuple(t.label for t in extension.terms)
-    after, driven, goal = before, plant, held
-    if extension.gears:
-        gears = plain | extension.gears
-        driven, goal = rollout_plant(part, gears, seconds), rollout_plant(rest, gears, seconds)
-    if names or extension.gears:
-        after, _ = distance(goal, scales, fit_rollout(driven, scales, extension))
-    with_hull = after
-    if hull:
-        with_hull, _ = distance(goal, scales, fit_rollout(driven, scales, replace(extension, hull=True)))
-    return FoldGain(test, before, after, with_hull, names)
+    train = dataset.with_runs([r for i, r in enumerate(dataset.runs) if i not in inside])
+    held = dataset.with_runs([r for i, r in enumerate(dataset.runs) if i in inside])
+    ordinary = recorded_gears(train, null)
+    changed = ordinary | gears
+
+    def errors(model: OpenLoop, driven: dict[str, Gear]) -> np.ndarray:
+        plant = rollout_plant(held, driven, horizon(dataset.ship.L))
+        return distance(plant, Scales(plant), model)[0]
+
+    def moved(model: Calibration) -> Calibration:
+        return _beginning_in(model, train, held, dataset)
+
+    own = errors(model_of(train, null, ordinary), ordinary)
+    after = own
+    if final.model.terms or gears:
+        after = errors(moved(model_of(train, final, changed)), changed)
+    hulls = (errors(moved(of_hull(final)), changed) for of_hull in (calibration_on_regressions, calibration_of))
+    return FoldErrors(test, errors(AS_IN_FILE, ordinary), own, after, *hulls)
+
+
+def model_of(train: Dataset, found: Fit, gears: dict[str, Gear]) -> Calibration:
+    """Calibration of a fit to the training runs, refined on rollouts where that pays on some of them.
+
+    Causes that begin with a run are left as they are: runs before and after would have to be refined separately.
+    """
+    model = calibration_of(found)
+    names = list(dict.fromkeys(r.group for r in train.runs))[::_VALIDATION]
+    validating = [i for i, r in enumerate(train.runs) if r.group in names]
+    if len(validating) == len(train) or any(t.since is not None for t in model.terms):
+        return model
+    valid = train.with_runs([train.runs[i] for i in validating])
+    rest = train.with_runs([r for r in train.runs if r.group not in names])
+    start = calibration_without(found, validating)
+    return refined_on(train, gears, refinement_length(rest, valid, gears, start), model)
+
+
+def _beginning_in(model: Calibration, known: Dataset, wanted: Dataset, all_runs: Dataset) -> Calibration:
+    """Calibration whose causes that begin with a run of `known` begin with the next one of `wanted`, in the order of
+    `all_runs`."""
+    place = {r.id: i for i, r in enumerate(all_runs.runs)}
+    places = [place[r.id] for r in wanted.runs]
+
+    def since(run: int) -> int:
+        return sum(i < place[known.runs[run].id] for i in places)
+
+    terms = tuple(t if t.since is None else replace(t, since=since(t.since)) for t in model.terms)
+    return replace(model, terms=terms)
+
+
+def recorded_gears(dataset: Dataset, null: Fit) -> dict[str, Gear]:
+    """Actuator dynamics without a cause: from the records, or those of the fit where there are none."""
+    if dataset.actuators == "commanded":
+        return dict(null.plant.ordinary)
+    batch = dataset.windows(min(len(run) for run in dataset.runs) - 1).batch()
+    return gears_of(fit_actuators(batch, dataset.dt))
+
+
+def on_fitted_runs(dataset: Dataset, null: Fit, seed: int) -> Calibrated:
+    """Errors of the ship file's model and of the baseline model `null` on the runs that were fitted."""
+    plant = rollout_plant(dataset, recorded_gears(dataset, null), horizon(dataset.ship.L))
+    models: tuple[OpenLoop, ...] = (AS_IN_FILE, calibration_of(null))
+    before, after = (distance(plant, Scales(plant), model)[0] for model in models)
+    return of_runs(dataset, before, after, seed, held_out=False)
+
+
+def of_runs(dataset: Dataset, before: np.ndarray, after: np.ndarray, seed: int, held_out: bool = True) -> Calibrated:
+    """Errors (N,) of every run, by the ship file's and by the calibrated model, as one statement."""
+    interval = mean_interval(after, seed, [run.group for run in dataset.runs])
+    longest = min(horizon(dataset.ship.L), max(float(run.t[-1] - run.t[0]) for run in dataset.runs))
+    return Calibrated(float(before.mean()), float(after.mean()), interval, longest, held_out)
 
 
 def summarise(before: np.ndarray, after: np.ndarray, seed: int, groups: Sequence[str]) -> Gain:
     """Paired gain with a bootstrap interval over groups of runs."""
-    rng = np.random.default_rng(seed)
-    place = {group: i for i, group in enumerate(dict.fromkeys(groups))}
-    member = np.array([place[group] for group in groups])
-    draws = rng.integers(0, len(place), (2000, len(place)))
-    plain, extended = (np.bincount(member, ed)[draws].sum(axis=1) for ed in (before, after))
+    plain, extended = (sums for sums in _drawn(np.stack([before, after]), seed, groups)[0])
     relative = 1.0 - extended / np.maximum(plain, 1e-12)
     low, high = np.quantile(relative, [0.025, 0.975])
     better = int(np.sum(after < before))
@@ -146,3 +156,19 @@ def summarise(before: np.ndarray, after: np.ndarray, seed: int, groups: Sequence
     return Gain(
         "ED", mean_b, mean_a, 1.0 - mean_a / max(mean_b, 1e-12), (float(low), float(high)), f"{better}/{len(before)}"
     )
+
+
+def mean_interval(errors: np.ndarray, seed: int, groups: Sequence[str]) -> tuple[float, float]:
+    """95 % interval of the mean of errors (N,), bootstrap over groups of runs."""
+    (sums,), sizes = _drawn(errors[None], seed, groups)
+    low, high = np.quantile(sums / sizes, [0.025, 0.975])
+    return float(low), float(high)
+
+
+def _drawn(values: np.ndarray, seed: int, groups: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
+    """Sums (C, draws) of values (C, N) over groups drawn with replacement, and the numbers of runs in them (draws,)."""
+    rng = np.random.default_rng(seed)
+    place = {group: i for i, group in enumerate(dict.fromkeys(groups))}
+    member = np.array([place[group] for group in groups])
+    draws = rng.integers(0, len(place), (_DRAWS, len(place)))
+    return np.stack([np.bincount(member, v)[draws].sum(axis=1) for v in values]), np.bincount(member)[draws].sum(axis=1)

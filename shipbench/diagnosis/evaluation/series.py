@@ -4,28 +4,28 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...estimation.calibration import calibration_of
 from ...estimation.forward import Segments
 from ...estimation.linearisation import Scales
 from ...estimation.open_loop import distance, rollout_plant
 from ...records import Dataset
 from ..result import Trace
 from ..selection.analysis import Analysis
-from .held_out_gain import Extension, fit_rollout, horizon
+from .held_out_gain import horizon, recorded_gears
 
 
-def trace_of(dataset: Dataset, found: Analysis, hull: bool) -> Trace:
-    """Trace of open-loop rollouts of the models fitted to all runs (the gain is held out, these plots are not), and of
-    latent forces before and after."""
-    extension = found.extension(hull)
-    seconds = horizon(dataset.ship.L)
-    plain = rollout_plant(dataset, found.plain_gears, seconds)
-    scales = Scales(plain)
-    before = distance(plain, scales, fit_rollout(plain, scales, Extension()))[1]
+def trace_of(dataset: Dataset, found: Analysis) -> Trace:
+    """Trace of open-loop rollouts of the calibrated ship without and with the causes, fitted to all runs (the gain is
+    held out, these plots are not), and of latent forces before and after."""
+    null, final, changed = found.selection.null, found.final, found.changed_gears
+    gears, seconds = recorded_gears(dataset, null), horizon(dataset.ship.L)
+    plain = rollout_plant(dataset, gears, seconds)
+    before = distance(plain, Scales(plain), calibration_of(null))[1]
     after = before
-    if extension.terms or extension.hull or extension.gears:
-        driven = rollout_plant(dataset, found.plain_gears | (extension.gears or {}), seconds)
-        after = distance(driven, scales, fit_rollout(driven, scales, extension))[1]
-    seg, null, final = plain.seg, found.selection.null, found.final
+    if found.unknown is None and (final.model.terms or changed):
+        driven = rollout_plant(dataset, gears | changed, seconds)
+        after = distance(driven, Scales(driven), calibration_of(final))[1]
+    seg = plain.seg
     short, B = null.plant, len(null.estimate)
 
     def force(z: np.ndarray) -> np.ndarray:

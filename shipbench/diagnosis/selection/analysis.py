@@ -18,7 +18,6 @@ from ...physics.actuators import Gear
 from ..actuators.identify import find_in_gears
 from ..actuators.kinds import GearFinding
 from ..actuators.record_error import RecordError
-from ..evaluation.held_out_gain import Extension
 from ..preparation.actuator_readings import judged
 from ..thresholds import THRESHOLDS
 from .requirements import Standard
@@ -39,9 +38,9 @@ class Analysis:
     """Findings of one set of runs.
 
     threshold: the one in use; hull: twice the log Bayes factor that the hull differs from the regressions, or 0; gears:
-    identified effects on actuators; plain_gears: the default dynamics that fit best; unknown: the dependence that no
-    identified cause covers; rival: one that covers about as much as the identified causes; left: one that remains
-    beside them; misread: errors of the actuators' records.
+    identified effects on actuators; unknown: the dependence that no identified cause covers; rival: one that covers
+    about as much as the identified causes; left: one that remains beside them; misread: errors of the actuators'
+    records.
     """
 
     selection: Selection
@@ -50,7 +49,6 @@ class Analysis:
     hull: float
     gears: tuple[GearFinding, ...]
     all_gears: tuple[GearFinding, ...]
-    plain_gears: dict[str, Gear]
     generic: tuple[Dependence, ...]
     unknown: Dependence | None = None
     rival: Dependence | None = None
@@ -85,23 +83,18 @@ class Analysis:
             "with and without it beside the other causes" if len(self.final.model.terms) > 1 else "with and without it",
         )
 
-    def extension(self, name_hull: bool) -> Extension:
-        """Terms, values and gears that the diagnosis adds to the plain model."""
-        if self.unknown is not None:
-            return Extension()
-        gears = {g.actuator: g.gear for g in self.gears} or None
-        return Extension(self.final.model.terms, self.final.values, name_hull and self.hull > HULL_THRESHOLD, gears)
+    @property
+    def changed_gears(self) -> dict[str, Gear]:
+        """Actuator dynamics that are causes, by actuator."""
+        return {g.actuator: g.gear for g in self.gears}
 
 
-def causes_of(
-    plant: Plant, threshold: float, only: Sequence[str] | None = None, settled: Sequence[str] = ()
-) -> tuple[Extension, dict[str, Gear]]:
-    """Causes of one training part alone, by the same selection, with the threshold of the whole; and the best ordinary
-    gears."""
-    selection = select(plain_model(plant, only, settled), threshold)
-    findings, plain, _ = find_in_gears(selection.final.plant)
-    gears = {g.actuator: g.gear for g in _named_gears(findings, threshold, only)}
-    return Extension(selection.final.model.terms, selection.final.values, False, gears or None), plain
+def causes_of(null: Fit, threshold: float, only: Sequence[str] | None = None) -> tuple[Fit, dict[str, Gear]]:
+    """Causes of one training part alone, by the same selection, with the threshold of the whole: the model with those
+    in the motion, and the actuator dynamics that are causes."""
+    selection = select(null, threshold)
+    findings, _, _ = find_in_gears(selection.final.plant)
+    return selection.final, {g.actuator: g.gear for g in _named_gears(findings, threshold, only)}
 
 
 def _named_gears(findings: Sequence[GearFinding], threshold: float, only: Sequence[str] | None) -> list[GearFinding]:
@@ -152,10 +145,10 @@ def analyse(
     )
     selection = select(null, np.inf if cautious else threshold)
     null = selection.null
-    findings, plain, errors = find_in_gears(null.plant)
+    findings, _, errors = find_in_gears(null.plant)
     gears = [] if cautious else _named_gears(findings, threshold, only)
     hull = 0.0 if is_spent() or (only is not None and HULL.name not in only) else hull_evidence(selection.final)
-    known = Analysis(selection, threshold, draws, hull, tuple(gears), tuple(findings), plain, ())
+    known = Analysis(selection, threshold, draws, hull, tuple(gears), tuple(findings), ())
     if is_spent():
         return known
     if only is not None or cautious:

@@ -131,7 +131,7 @@ def gain_per_run(rows: Sequence[tuple[str, float, float]]) -> Drawing:
     order = sorted(((b, a) for _, b, a in rows), key=lambda row: -row[0])
     top = max((max(row) for row in order), default=1.0)
     axes = Axes((0.0, len(order) + 1.0), (0.0, 1.08 * max(top, _LEAST)), WIDTH, HEIGHT)
-    parts = [axes.grid("runs in order of the plain model's error", "held-out position error ED [m]")]
+    parts = [axes.grid("runs in order of the error before", "held-out position error ED [m]")]
     for i, (before, after) in enumerate(order):
         x, low, high = (f"{float(v):.1f}" for v in (axes.px(i + 1.0), axes.py(after), axes.py(before)))
         parts.append(f'<path class="join" d="M{x} {high}V{low}"/>')
@@ -142,7 +142,7 @@ def gain_per_run(rows: Sequence[tuple[str, float, float]]) -> Drawing:
     return Drawing(
         "Position error of every run",
         "".join(parts),
-        "Ring: plain physics. Dot: extended model. No run was used to fit its own models.",
+        "Ring: before. Dot: after. No run was used to fit its own models.",
     )
 
 

@@ -16,7 +16,7 @@ from ...signals import ACTUATORS, F_B, F_S, STATES
 from ..recorded import RUNS, thinned
 from .text import figure
 
-MODELS = ("plain physics", "extended model")
+MODELS = ("calibrated ship", "extended model")
 """Names of model 0 and model 1."""
 FITS = [STATES[i] for i in FITTED]
 _SAMPLES = 25_000

@@ -21,8 +21,8 @@ from . import tables as tables
 from .linked import FITS, MODELS, changed, position_errors, rollout_plots, rollouts
 from .remains import remaining_sentences
 from .text import (
+    added,
     calibration_words,
-    compared_model,
     estimate,
     figure,
     force_words,
@@ -32,6 +32,7 @@ from .text import (
     headline,
     in_words,
     next_command,
+    own_gain,
     strength,
 )
 
@@ -60,7 +61,7 @@ def diagnosis_page(d: Diagnosis) -> str:
         lead=f"{headline(d)} {calibration_words(d)}".strip(), tiles=_tiles(d),
         plots=d.trace is not None, style=_STYLE,
         warnings=d.warnings, causes=[_cause(c, d) for c in d.causes], instead=_no_cause(d), gain=_gain_of_all(d),
-        extended_model=compared_model(d),
+        extended_model=d.extended_model,
         compare=next_command(d), remains=remaining_sentences(d),
         wrong=[_wrong(w.channel, w.share_of_error, w.when) for w in d.what_is_wrong],
         candidates=table_cells(tables.candidates(d)), limits=table_cells(tables.detection_limits(d)),
@@ -95,13 +96,15 @@ def _verdict(d: Diagnosis) -> Tile:
 
 
 def _error(d: Diagnosis) -> Tile:
-    """Tile of the held-out error of the baseline and of the extended model, or of its absence."""
-    if d.gain is not None:
-        return Tile(
-            "Held-out position error",
-            f"{figure(d.gain.before)} m to {figure(d.gain.after)} m",
-            f"plain to extended model: {gain_share(d.gain)}",
-        )
+    """Tile of the held-out errors of ship file, calibrated ship and extended model, or of their absence."""
+    own = d.calibration if d.calibration is not None and d.calibration.held_out else None
+    values, names = ([own.before, own.after], ["ship file", "calibrated"]) if own else ([], [])
+    if d.gain is not None and added(d):
+        values, names = [*(values or [d.gain.before]), d.gain.after], [*(names or ["calibrated"]), "with the causes"]
+    if values:
+        share = f": {gain_share(d.gain)}" if d.gain is not None else ""
+        errors = " to ".join(f"{figure(v)} m" for v in values)
+        return Tile("Held-out position error", errors, f"{', '.join(names)}{share}")
     if d.trace is None:
         return Tile("Held-out position error", "not measured")
     errors = [position_errors(d.trace, p) for p in rollouts(d.trace, changed(d))]
@@ -109,7 +112,7 @@ def _error(d: Diagnosis) -> Tile:
     return Tile(
         "Held-out position error",
         "not measured",
-        "on the runs of the fit: " + " to ".join(means) + (", plain to extended model" * (len(means) > 1)),
+        "on the runs of the fit: " + " to ".join(means) + (", calibrated ship to extended model" * (len(means) > 1)),
     )
 
 
@@ -146,7 +149,7 @@ def _cause(c: Cause, d: Diagnosis) -> dict[str, Any]:
         "sizes": [estimate(c.effect, name, e) for name, e in c.parameters.items()],
         "force": _capital(force) + "." if force else "", "strength": _capital(strength(c)) + ".",
         "evidence": c.evidence,
-        "gain": gain_words(d.gain) if len(d.causes) == 1 and d.gain is not None else "", "line": _lines(c.correction),
+        "gain": gain_words(own, c) if (own := own_gain(c, d)) is not None else "", "line": _lines(c.correction),
         "rivals": c.confused_with,
         "trial": _capital(c.separating_manoeuvre.rstrip(".")) + "." if c.separating_manoeuvre else "",
     }  # fmt: skip
@@ -160,7 +163,8 @@ def _lines(correction: str) -> str:
 def _gain_of_all(d: Diagnosis) -> str:
     """Text of the gain of several causes together, or that none was measured; that of a single cause stands beside
     it."""
-    return gain_words(d.gain, len(d.causes)) if d.causes and (d.gain is None or len(d.causes) > 1) else ""
+    several = added(d)
+    return gain_words(d.gain, *several) if d.causes and (d.gain is None or len(several) > 1) else ""
 
 
 def _no_cause(d: Diagnosis) -> str:
@@ -212,7 +216,7 @@ def _which(drawn: int, total: int, held_out: bool) -> str:
     fitted = (
         "No model was fitted to the runs that it predicts." if held_out else "Here the models are fitted to all runs."
     )
-    return f"{some}, from the greatest error of the plain model to the least. {fitted}"
+    return f"{some}, from the greatest error of the calibrated ship to the least. {fitted}"
 
 
 def _worst(runs: Sequence[tuple[str, float]], listed: int = 5) -> str:

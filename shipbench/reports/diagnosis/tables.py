@@ -24,7 +24,7 @@ _SIGNAL = {"heading": PSI, "surge": U, "sway": V, "yaw rate": R}
 def channels(trace: Trace, tables: ErrorTables, extended: bool) -> Table:
     """Table of the error of each channel of the open-loop predictions: root mean square, share, fit; of the baseline
     and of the extended model."""
-    models = ("plain", "extended")[: 2 if extended else 1]
+    models = ("calibrated", "extended")[: 2 if extended else 1]
     three, zero = significant(3), number(0)
     columns = [TableColumn("channel", "channel"), *(TableColumn(f"RMS error, {m}", f"rms_{m}", three) for m in models)]
     columns += [TableColumn(f"fit, {m} [%]", f"fit_{m}", zero) for m in models] + [
@@ -46,7 +46,8 @@ def channels(trace: Trace, tables: ErrorTables, extended: bool) -> Table:
         "RMS error: root mean square over all time steps of all runs. Fit: NRMSE as in MATLAB's `compare`, median "
         "of the runs; 100 % is exact, "
         "0 % is no better than the mean.",
-        "Share: of the squared errors of the plain model, each divided by the variance of its channel within the runs.",
+        "Share: of the squared errors of the calibrated ship, each divided by the variance of its channel within the "
+        "runs.",
     )
     return Table("Error of each channel", columns, rows, notes)
 
@@ -82,8 +83,8 @@ def gains(d: Diagnosis) -> Table:
     """Table of the held-out position error of every run before and after."""
     three = significant(3)
     columns = [
-        TableColumn("run", "run"), TableColumn("plain [m]", "before", three),
-        TableColumn("extended [m]", "after", three),
+        TableColumn("run", "run"), TableColumn("before [m]", "before", three),
+        TableColumn("after [m]", "after", three),
         TableColumn("less error [%]", "less", number(0)),
     ]  # fmt: skip
     rows = [
@@ -106,7 +107,8 @@ def candidates(d: Diagnosis) -> Table:
         for c in d.candidates
     ]  # fmt: skip
     notes = (
-        "Log Bayes factor: gain in log evidence when this one effect is added to the plain model. Score: twice that. "
+        "Log Bayes factor: gain in log evidence when this one effect is added to the calibrated ship. Score: twice "
+        "that. "
         "p: probability that the best of all candidates reaches this score by chance.",
     )
     return Table("All candidates", columns, rows, notes)

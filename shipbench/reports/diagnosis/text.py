@@ -124,15 +124,31 @@ def _bearing(angle: float) -> str:
     return f"{round(math.degrees(angle)) % 360:03d}°"
 
 
-def gain_words(g: Gain | None, named: int = 1) -> str:
-    """Text of the gain of the extension, with the number of identified causes, on held-out runs."""
+def added(d: Diagnosis) -> list[Cause]:
+    """Causes beyond the ship's own coefficients."""
+    return [c for c in d.causes if not _of_ship(c)]
+
+
+def _of_ship(c: Cause) -> bool:
+    effect = _effect(c.effect)
+    return effect is not None and effect.traits.search == "hull"
+
+
+def own_gain(c: Cause, d: Diagnosis) -> Gain | None:
+    """Gain of one cause alone: of the ship's own coefficients, or of the only other one; else None."""
+    return c.gain if _of_ship(c) else d.gain if len(added(d)) == 1 else None
+
+
+def gain_words(g: Gain | None, *causes: Cause) -> str:
+    """Text of the gain of causes together on held-out runs: beside the calibrated ship, or of calibrating her."""
     if g is None:
         return "The gain on held-out runs was not measured."
     low, high = g.ci95
-    all_of_them = "it" if named == 1 else "both" if named == 2 else f"all {named}"
+    all_of_them = "it" if len(causes) == 1 else "both" if len(causes) == 2 else f"all {len(causes)}"
+    whose = "" if any(map(_of_ship, causes)) else " of the calibrated ship"
     doubt = "" if low > 0 else " This may be no gain at all." if high > 0 else " The extended model is worse."
     return (
-        f"With {all_of_them}, the {_METRICS.get(g.metric, g.metric)} on held-out runs "
+        f"With {'them' if not whose else all_of_them}, the {_METRICS.get(g.metric, g.metric)}{whose} on held-out runs "
         f"{'falls' if g.relative >= 0 else 'rises'} from "
         f"{figure(g.before)} m to {figure(g.after)} m: {gain_share(g)}.{doubt}"
     )
@@ -155,7 +171,9 @@ def headline(d: Diagnosis) -> str:
     if d.verdict == "found":
         *first, last = map(in_words, d.causes)
         found = f"{', '.join(first)}, and {last}" if first else last
-        return f"Found: {found}. {gain_words(d.gain, len(d.causes))}"
+        if not added(d):
+            return f"Found: only {found}."
+        return f"Found: {found}. {gain_words(d.gain, *added(d))}"
     if d.verdict == "unknown" and d.unknown:
         return (
             f"The model lacks something that is not in the library: {what_it_is(d.unknown)}. "
@@ -178,28 +196,22 @@ def calibration_words(d: Diagnosis) -> str:
     if d.calibration is None:
         return ""
     c = d.calibration
+    where = "held-out runs" if c.held_out else "the runs that were fitted"
     return (
-        f"In open-loop rollouts of at most {c.seconds:.0f} s, the ship file's model is {figure(c.before)} m off on "
-        f"average. With the ship's own coefficients calibrated it is {figure(c.after)} m off, on the runs that were "
-        "fitted."
+        f"In open-loop rollouts of at most {c.seconds:.0f} s on {where}, the ship file's model is {figure(c.before)} m "
+        f"off on average. With the ship's own coefficients calibrated it is {figure(c.after)} m off "
+        f"(95 %: {figure(c.ci95[0], 2)} to {figure(c.ci95[1], 2)} m)."
     )
 
 
 def next_command(d: Diagnosis) -> str:
-    """Command that compares the baseline model with the extended one on held-out runs, or with the calibrated one where
-    no cause is identified; "" where neither is better."""
-    inside = [c.effect for c in d.causes if not (c.effect in EFFECTS and EFFECTS.get(c.effect).traits.describes_data)]
-    model = "+".join(["physics", *inside])
-    if not d.causes and d.calibration is not None and d.calibration.after < d.calibration.before:
-        model = "calibrated"
-    if model == "physics":
+    """Command that compares `physics`, the calibrated ship and the proposed model on held-out runs; "" where `physics`
+    is proposed."""
+    if d.extended_model == "physics":
         return ""
-    return f"shipbench run --model physics --model {shlex.quote(model)} --dataset {shlex.quote(d.spec or d.dataset)}"
-
-
-def compared_model(d: Diagnosis) -> str:
-    """Name of the model that `next_command` compares with the baseline."""
-    return d.extended_model if d.causes else "calibrated"
+    models = dict.fromkeys(["physics", d.extended_model.split("+")[0], d.extended_model])
+    named = " ".join(f"--model {shlex.quote(m)}" for m in models)
+    return f"shipbench run {named} --dataset {shlex.quote(d.spec or d.dataset)}"
 
 
 def detectable(c: Candidate) -> str:
@@ -255,8 +267,7 @@ def _newtons(value: float, unit: str) -> str:
 
 
 def cause_texts(c: Cause, alone: Gain | None = None) -> list[str]:
-    """Texts on a cause besides its sizes: force, evidence, gain where it is the only cause, causes it is confounded
-    with, correction."""
+    """Texts on a cause besides its sizes: force, evidence, its gain alone, causes it is confounded with, correction."""
     force = force_words(c.force)
     texts = [f"Its force is {force}."] if force else []
     texts.append(f"{strength(c)[0].upper()}{strength(c)[1:]}.")
@@ -274,8 +285,7 @@ def cause_texts(c: Cause, alone: Gain | None = None) -> list[str]:
 
 
 def cause_lines(c: Cause, width: int = WIDTH, alone: Gain | None = None) -> list[str]:
-    """Lines on a cause: sizes, force, evidence and the causes it is confounded with; alone: the gain where it is the
-    only cause."""
+    """Lines on a cause: sizes, force, evidence and the causes it is confounded with; alone: its own gain."""
     part = _effect(c.effect)
     lines = paragraph(f"{c.rank}. {c.effect}" + (f": {part.summary}" if part else ""), width, "  ", " " * 5)
     for name, e in c.parameters.items():
@@ -316,7 +326,7 @@ def _detectable_lines(d: Diagnosis, width: int) -> list[str]:
 
 def _wrong_lines(d: Diagnosis, width: int) -> list[str]:
     """Lines on the error of the baseline model in each channel, and on the noise model."""
-    lines = ["What the plain physics model gets wrong:"] if d.what_is_wrong else []
+    lines = ["What the calibrated ship gets wrong:"] if d.what_is_wrong else []
     for w in d.what_is_wrong:
         none = "its missing force shows no dependence on motion, actuators or time alone"
         when = w.when if w.depends_on else f"{w.when}; {none}".removeprefix("; ")
@@ -347,12 +357,12 @@ def summary_lines(d: Diagnosis, width: int = WIDTH, full: bool = True) -> list[s
     if d.causes:
         lines.append("Causes:")
         for c in d.causes:
-            lines += cause_lines(c, width, d.gain if len(d.causes) == 1 else None)
+            lines += cause_lines(c, width, own_gain(c, d))
         lines.append("")
     if full:
         lines += _wrong_lines(d, width) + _candidate_lines(d, width) + _detectable_lines(d, width)
     if command := next_command(d):
-        lines += [*paragraph(f"Model to compare: {compared_model(d)}", width), *command_lines(command, width)]
+        lines += [*paragraph(f"Model to compare: {d.extended_model}", width), *command_lines(command, width)]
     if not full:
         lines += ["", "All tables (errors by channel, candidates, detection limits): --full"]
     return lines

@@ -113,7 +113,7 @@ def test_pointing_at_a_history_shows_time_value_and_unit_and_marks_that_time_on_
     )[2:]
     assert re.search(r"\b30\.0 s\b", shown)
     assert all(
-        re.search(rf"{name} : -?\d+\.\d{{3}} m/s", shown) for name in ("measured", "plain physics", "extended model")
+        re.search(rf"{name} : -?\d+\.\d{{3}} m/s", shown) for name in ("measured", "calibrated ship", "extended model")
     )
     assert marked == 3
 

@@ -79,10 +79,10 @@ def test_the_summary_says_the_verdict_with_sizes_and_the_next_command():
     assert "to 143° (95 %: 138° to 149°)" in text
     assert "falls from 21.3 m to 9.80 m: 54 % less (95 %: 40 to 66 %)" in text
     assert "better in 24 of 24 runs" in text
-    assert "Found: a current of 0.31 m/s towards 143°. With it, the position error" in text
+    assert "Found: a current of 0.31 m/s towards 143°. With it, the position error of the calibrated ship" in text
     assert "Its force is up to 38 kN sideways and 1.2 MN m in yaw on these runs." in text
     assert "Naming it removes 11.5 m of 21.3 m position error on held-out runs." in text
-    assert "shipbench run --model physics --model physics+current" in text
+    assert "shipbench run --model physics --model calibrated --model calibrated+current" in text
     assert "reciprocal courses" in text
     assert "WARNING: few runs" in text
 
