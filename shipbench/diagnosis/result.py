@@ -178,7 +178,8 @@ class Diagnosis:
 
     def document(self) -> dict[str, Any]:
         """Content of diagnosis.json by the contract, with `warnings`, the gain of all causes together, and `unknown`
-        (channel and variable) where that is the verdict."""
+        (channel and variable) where that is the verdict. `base_model` is the one that the proposed model is compared
+        with."""
         return {
             "schema": SCHEMA, "dataset": self.dataset, "base_model": "physics", "verdict": self.verdict,
             "causes": [_plain(asdict(c)) for c in self.causes],

@@ -23,7 +23,7 @@ def test_a_trial_too_short_to_name_its_current_has_all_lines_and_files_too(tmp_p
     lines = done.stdout.splitlines()
     assert len(lines) == 5
     assert lines[0].endswith("Found: nothing.")
-    assert re.fullmatch(r".*held-out runs: hold [\d.]+ m, physics [\d.]+ m\.", lines[1])
+    assert re.fullmatch(r".*held-out runs: hold [\d.]+ m, physics [\d.]+ m(, calibrated [\d.]+ m)?\.", lines[1])
     assert json.loads((tmp_path / "demo" / "diagnosis" / "diagnosis.json").read_text())["causes"] == []
     assert 'href="./diagnosis/report.html"' in (tmp_path / "demo" / "report.html").read_text()
     assert sorted(path.name for path in tmp_path.iterdir()) == ["demo"]
@@ -42,7 +42,7 @@ def test_demo_finds_the_current_and_says_so_in_five_lines(tmp_path, monkeypatch)
     assert abs(size["speed"]["value"] - SPEED) < 0.05
     assert abs(size["to"]["value"] - TOWARDS) < np.deg2rad(5.0)
     errors = {name: float(value) for name, value in re.findall(r"(\S+) ([\d.]+) m[,.]", lines[1])}
-    assert errors["physics+current"] < 0.5 * errors["physics"]
+    assert errors["calibrated+current"] < 0.5 * errors["physics"]
     page = (tmp_path / "demo" / "report.html").read_text()
-    assert "physics+current" in page
+    assert "calibrated+current" in page
     assert sorted(path.name for path in tmp_path.iterdir()) == ["demo"]

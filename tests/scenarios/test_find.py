@@ -158,7 +158,7 @@ def test_a_hidden_current_is_sized_and_pays_on_runs_that_were_not_fitted(driftin
     cause = verdict.causes[0]
     assert verdict.verdict == "found"
     assert cause.effect == "current"
-    assert verdict.extended_model.startswith("physics+current")
+    assert verdict.extended_model.startswith("calibrated+current")
     assert cause.parameters["speed"].value == pytest.approx(np.hypot(0.25, 0.2), rel=0.15)
     assert np.sin(cause.parameters["to"].value - np.arctan2(-0.2, 0.25)) == pytest.approx(0.0, abs=0.15)
     assert verdict.gain is not None

@@ -136,7 +136,7 @@ def test_a_late_record_is_named_once_and_told_from_a_late_rudder():
     """The gear seems late, and the rudder acts before its record: the same effect twice, which no spec takes."""
     data = sea_trials(load_mmg_ship("kcs"), 4, (), Trials(runs=12))
     result = diagnose(recorded(data, DELTA, lambda d: np.r_[d[[0, 0]], d[:-2]]), gain=False)
-    assert ([c.effect for c in result.causes], result.extended_model) == (["rudder_delay"], "physics+rudder_delay")
+    assert ([c.effect for c in result.causes], result.extended_model) == (["rudder_delay"], "calibrated+rudder_delay")
     assert result.causes[0].parameters["delay"].value == pytest.approx(2.0, abs=0.1)
     assert "the record is late" in result.causes[0].evidence
 

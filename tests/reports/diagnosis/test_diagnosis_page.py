@@ -100,11 +100,11 @@ def test_the_commands_name_the_data_as_the_user_did(spec, toy, tmp_path, monkeyp
     )
     result = CliRunner().invoke(app, ["diagnose", spec, "--out", str(tmp_path / "out")])
     assert loaded == [spec]
-    assert f"--model physics+current --dataset {shlex.quote(spec)}" in " ".join(
+    assert f"--model calibrated+current --dataset {shlex.quote(spec)}" in " ".join(
         result.stdout.replace("\\\n", "").split()
     )  # broken for a shell
     page = html.unescape((tmp_path / "out/report.html").read_text())
-    assert f"--model physics+current --dataset {shlex.quote(spec)}<" in page
+    assert f"--model calibrated+current --dataset {shlex.quote(spec)}<" in page
     assert f"shipbench diagnose {shlex.quote(spec)}<" in page
 
 
