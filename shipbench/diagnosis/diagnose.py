@@ -135,7 +135,7 @@ def _diagnosed(
     unknown = (bool(doubts) and not causes) or (found.unknown is not None and not units)
     verdict = "unknown" if unknown else "found" if causes else "none"
     own = worth.calibration or (on_fitted_runs(dataset, found.selection.null, seed) if rests else None)
-    gain = worth.own if worth.hull and len(causes) == 1 else worth.gain
+    gained = worth.own if worth.hull and len(causes) == 1 else worth.gain
     proposed = _proposed([c.effect for c in causes if c.effect not in behind], own)
     return Diagnosis(
         dataset=dataset.name, verdict=verdict, causes=tuple(causes),
@@ -143,7 +143,7 @@ def _diagnosed(
         what_is_wrong=what_is_wrong(trace),
         unexplained_after=remaining(found) | {"taken_as_noise": noise_in_words(found.final)},
         extended_model=proposed, fingerprint=fingerprint, seconds=time.perf_counter() - began,
-        warnings=tuple(lines), gain=gain if causes else None, unknown=unknown_part(found),
+        warnings=tuple(lines), gain=gained if causes else None, unknown=unknown_part(found),
         gain_per_run=worth.per_run if causes else (), trace=trace,
         calibration=own,
     )  # fmt: skip

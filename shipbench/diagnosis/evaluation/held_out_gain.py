@@ -90,8 +90,8 @@ def fold_errors(dataset: Dataset, test: np.ndarray, null: Fit, final: Fit, gears
     after = own
     if final.model.terms or gears:
         after = errors(moved(model_of(train, final, changed)), changed)
-    hulls = (errors(moved(of_hull(final)), changed) for of_hull in (calibration_on_regressions, calibration_of))
-    return FoldErrors(test, errors(AS_IN_FILE, ordinary), own, after, *hulls)
+    alike, other = (errors(moved(of_hull(final)), changed) for of_hull in (calibration_on_regressions, calibration_of))
+    return FoldErrors(test, errors(AS_IN_FILE, ordinary), own, after, alike, other)
 
 
 def model_of(train: Dataset, found: Fit, gears: dict[str, Gear]) -> Calibration:
