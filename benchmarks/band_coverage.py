@@ -1,40 +1,37 @@
-"""Share of held-out measurements inside the 90 % bands of `calibrated`, by horizon.
+"""Share of held-out measurements inside the 90 % bands of a model, by horizon, with width and interval score.
 
     python benchmarks/band_coverage.py harbour90_noisy 120
-    python benchmarks/band_coverage.py 'esso_osaka[path=FOLDER]' 100
+    python benchmarks/band_coverage.py 'esso_osaka[path=FOLDER]' 100 physics
 
-The published split where there is one, else every second run is held out. Position counts north and east apart.
+The study that `shipbench run --bands` makes: the published split where there is one, else five folds. Position counts
+north and east apart.
 """
 
 from __future__ import annotations
 
 import sys
+import tempfile
 
-import numpy as np
-
+from shipbench.bench.runner import run_tasks
+from shipbench.bench.scoring import BAND
+from shipbench.bench.task import Task
 from shipbench.data.base import load_dataset
-from shipbench.predictors.calibrated import Calibrated
-from shipbench.signals import PSI
-
-HORIZONS = (10.0, 30.0, 60.0, 120.0)
 
 
-def main(spec: str, seconds: float) -> None:
-    data = load_dataset(spec)
-    published = {r.meta.split for r in data.runs} >= {"train", "test"}
-    held = [r.meta.split == "test" if published else i % 2 == 0 for i, r in enumerate(data.runs)]
-    train = [r for r, out in zip(data.runs, held, strict=True) if not out]
-    test = data.with_runs([r for r, out in zip(data.runs, held, strict=True) if out])
-    model = Calibrated().fit(data.with_runs([r for i, r in enumerate(train) if i % 9]), data.with_runs(train[::9]))
-    batch = test.windows(round(seconds / data.dt)).batch()
-    low, high = np.nanquantile(model.predict_samples(batch.s0, batch.U), [0.05, 0.95], axis=0)
-    inside = (batch.truth[..., :6] >= low) & (batch.truth[..., :6] <= high)
-    print(f"{data.name}: {len(batch.s0)} windows")
-    for horizon in HORIZONS:
-        if (k := round(horizon / data.dt) - 1) < inside.shape[1]:
-            position, heading = inside[:, k, :2].mean(), inside[:, k, PSI].mean()
-            print(f"{horizon:4.0f} s: position {position:.2f}, heading {heading:.2f}")
+def main(spec: str, seconds: float, model: str = "calibrated") -> None:
+    published = {r.meta.split for r in load_dataset(spec).runs} >= {"train", "test"}
+    split = {"split": "published"} if published else {}
+    task = Task(dataset=spec, models=(model,), horizon_s=seconds, bands=True, **split)
+    with tempfile.TemporaryDirectory() as folder:
+        outcome = run_tasks([task], folder)
+    rows, summaries = outcome.rows, outcome.summaries
+    print(f"{summaries[0]['dataset']}, {model}: {len(rows)} windows, {(rows['status'] == 'ok').sum()} scored")
+    for note in {s["no_band"]: None for s in summaries if "no_band" in s}:
+        print(f"no band: {note}")
+    for column in summaries[0]["columns"]:
+        if column["name"].startswith(BAND):
+            print(f"{column['label']:28s} {rows[column['name']].mean():.3g} {column['unit']}")
 
 
 if __name__ == "__main__":
-    main(sys.argv[1], float(sys.argv[2]))
+    main(sys.argv[1], float(sys.argv[2]), *sys.argv[3:])

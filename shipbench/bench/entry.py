@@ -16,7 +16,7 @@ from ..names import LONGEST_LABEL, check_label, check_name, check_run, shown
 from ..storage import Frame
 from .regimes import COLUMNS as FEATURES
 from .results import STATUSES
-from .scoring import DIVERGED_DISTANCE, HORIZONS_S, columns
+from .scoring import BAND, DIVERGED_DISTANCE, HORIZONS_S, columns
 from .task import make_task
 
 Refuse = Callable[[str], InputError]
@@ -149,9 +149,12 @@ def check_task_of(summary: dict[str, Any], refuse: Refuse) -> None:
         raise refuse(
             f"summary.json: dt = {dt:g} s for a horizon of {task.horizon_s:g} s; accepted: the sample time of the data"
         )
-    expected = [asdict(c) for c in columns(task.metrics, task.horizon_s, dt)]
+    expected = [asdict(c) for c in columns(task.metrics, task.horizon_s, dt, task.bands)]
     if [dict(c) for c in summary["columns"]] != expected:
-        raise refuse("summary.json: columns are not those of task.metrics: " + ", ".join(c["name"] for c in expected))
+        raise refuse(
+            "summary.json: columns are not those of task.metrics and task.bands: "
+            + ", ".join(c["name"] for c in expected)
+        )
 
 
 def check_columns(
@@ -216,7 +219,7 @@ def check_scores(rows: Frame, metrics: Iterable[str], scores: Iterable[str], ref
         values = rows[name].to_numpy(float, na_value=np.nan)
         label, known = "ED" if name == "ed" else name, np.isfinite(values)
         bad = (np.abs(values) > LARGEST) | (~scored & ~np.isnan(values))
-        if name in own and name not in _SIGNED:
+        if (name in own and name not in _SIGNED) or name.startswith(BAND):
             bad |= scored & (values < 0)
         if name in own and name not in _UNDEFINED:
             bad |= scored & ~known

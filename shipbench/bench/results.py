@@ -7,7 +7,7 @@ all.
 - `windows.parquet`: one row per scored window: what the true ship does there (see `regimes`). These three files are a
 submission.
 - `truth/<dataset>/fold0.npz`: ids, s0, U and truth of the scored windows (the same for all models).
-- `cells/<dataset>/<model>/fold0-seed0/`: rows.parquet, summary.json, predictions.npz (S), equations.txt, model/.
+- `cells/<dataset>/<model>/fold0-seed0/`: rows.parquet, summary.json, predictions.npz (S; W of bands), equations.txt, model/.
 """
 
 from __future__ import annotations
@@ -126,6 +126,22 @@ def read_predictions(out: Path, cell: Cell) -> np.ndarray | None:
     return S
 
 
+def read_band(out: Path, cell: Cell) -> np.ndarray | None:
+    """Half-widths W (batch, K, 6) of the band of a cell, or None where none is saved.
+
+    Raises:
+        InputError: the file is damaged, or its array is of another shape than the motion of the prediction.
+    """
+    path, S = out / cell.folder / "predictions.npz", read_predictions(out, cell)
+    if S is None or (W := read_npz(path).get("W")) is None:
+        return None
+    if W.shape != (*S.shape[:2], 6) or W.dtype.kind != "f":
+        raise InputError(
+            f"{path}: W {W.shape} of {W.dtype} is no band; accepted: numbers {(*S.shape[:2], 6)}. {_WHOLE}"
+        )
+    return W
+
+
 def _arrays(path: Path, names: Sequence[str]) -> dict[str, np.ndarray]:
     """Arrays of these names in a .npz file."""
     found = read_npz(path)
@@ -139,16 +155,17 @@ _CELL_FILES = ("rows.parquet", "summary.json", "predictions.npz", "equations.txt
 
 
 def write_cell(
-    out: Path, cell: Cell, rows: Frame, summary: dict[str, Any], S: np.ndarray | None, files: Mapping[str, bytes]
-) -> None:
+    out: Path, cell: Cell, rows: Frame, summary: dict[str, Any], S: np.ndarray | None, files: Mapping[str, bytes],
+    W: np.ndarray | None = None,
+) -> None:  # fmt: skip
     """Write a finished cell atomically (an older one is replaced); `files` are further ones, by relative name (saved
-    model, equations)."""
+    model, equations); W are the half-widths of its band."""
     final = out / cell.folder
     old = final.with_name(f".{final.name}.{os.getpid()}.old.tmp")
     with in_one_step(final) as part:
         part.mkdir(parents=True)
         if S is not None:
-            np.savez_compressed(part / "predictions.npz", S=S)
+            np.savez_compressed(part / "predictions.npz", S=S, **({} if W is None else {"W": W}))
         for name, content in files.items():
             (part / name).parent.mkdir(parents=True, exist_ok=True)
             (part / name).write_bytes(content)
@@ -246,4 +263,5 @@ def rescore(out: Path, summary: dict[str, Any]) -> dict[str, np.ndarray]:
     batch, S = read_truth(out, cell.dataset, cell.fold), read_predictions(out, cell)
     ok = np.array([status == "ok" for status in summary["run_status"]])
     S = np.full_like(batch.truth, np.nan) if S is None else S
-    return measure(summary["task"]["metrics"], batch, S, L=summary["ship_L"], dt=summary["dt"], ok=ok)
+    W = read_band(out, cell) if summary["task"].get("bands") else None
+    return measure(summary["task"]["metrics"], batch, S, L=summary["ship_L"], dt=summary["dt"], ok=ok, W=W)

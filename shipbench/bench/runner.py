@@ -123,7 +123,7 @@ def run_tasks(
                 for cell, key, answer in zip(part.cells, part.keys, answers, strict=True):
                     record = _score(part.study, part.spec, cell, answer)
                     summary = record.summary | about | _identity(part, key, answer)
-                    write_cell(out, cell, record.rows, summary, answer.S, answer.files)
+                    write_cell(out, cell, record.rows, summary, answer.S, answer.files, answer.W)
                     finished.add(cell)
                     progress.done(cell.label, _outcome_text(summary), _kind(cell), answer.fit_s + answer.predict_s)
         finally:
@@ -159,7 +159,7 @@ def _prepare(task: Task, memory: Memory) -> Study:
     )
     folds = make_folds(data, task)
     batches = [fold.test.batch(task.history(data.dt)) for fold in folds]
-    found = [asdict(c) for c in columns(task.metrics, task.horizon_s, data.dt)]
+    found = [asdict(c) for c in columns(task.metrics, task.horizon_s, data.dt, task.bands)]
     return Study(task, data, folds, batches, specs, facts, (*data.notes, *notes), found)
 
 
@@ -256,7 +256,8 @@ def _score(study: Study, spec: Spec, cell: Cell, answer: Answer) -> _Record:
     else:
         reasons = divergence(batch.truth, S, data.dt)
         statuses = ["diverged" if r else "ok" for r in reasons]
-        values = measure(task.metrics, batch, S, L=data.ship.L, dt=data.dt, ok=np.array([not r for r in reasons]))
+        ok = np.array([not r for r in reasons])
+        values = measure(task.metrics, batch, S, L=data.ship.L, dt=data.dt, ok=ok, W=answer.W)
         status = "diverged" if any(reasons) else "ok"
         reason = next((f"run {i}: {r}" for i, r in zip(batch.ids, reasons, strict=True) if r), "")
     times = {"fit_s": answer.fit_s, "fit_shared_by": answer.shared_by, "predict_s": answer.predict_s}

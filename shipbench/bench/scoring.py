@@ -6,14 +6,20 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..metrics.base import METRICS, Column
+from ..metrics.base import METRICS, Column, state_error
 from ..metrics.ed import ed
 from ..records import Batch
-from ..signals import STATES
+from ..signals import MOTION, PSI, STATES, X, Y
+from .bands import COVERAGE
 
 HORIZONS_S = (10.0, 30.0, 60.0, 120.0)
 DIVERGED_DISTANCE = 1e5
 """Largest position error [m] of a prediction that has not diverged."""
+
+
+BAND = "band_"
+"""Begin of the names of the columns of bands."""
+_BAND_CHANNELS = {"position": ("position", "m", [X, Y]), "heading": ("heading", "rad", [PSI])}
 
 
 def horizons(horizon_s: float, dt: float) -> dict[str, int]:
@@ -25,10 +31,38 @@ def horizons(horizon_s: float, dt: float) -> dict[str, int]:
     }
 
 
-def columns(metrics: Sequence[str], horizon_s: float, dt: float) -> list[Column]:
-    """Numeric columns of a row, in order."""
+def columns(metrics: Sequence[str], horizon_s: float, dt: float, bands: bool = False) -> list[Column]:
+    """Numeric columns of a row, in order; with `bands` those of `band_scores`."""
     found = [column for name in metrics for column in METRICS.get(name).columns]
-    return found + [Column(name, f"ED at {name[6:-1]} s", "m") for name in horizons(horizon_s, dt)]
+    at = horizons(horizon_s, dt)
+    found += [Column(name, f"ED at {name[6:-1]} s", "m") for name in at]
+    for name, (label, unit, _) in _BAND_CHANNELS.items() if bands else ():
+        found += [Column(f"{BAND}{name}_{k[3:]}", f"{label} inside at {k[6:-1]} s", "%") for k in at]
+        found += [Column(f"{BAND}{name}_width", f"{label} width", unit)]
+        found += [Column(f"{BAND}{name}_score", f"{label} interval score", unit)]
+    return found
+
+
+def band_scores(truth: np.ndarray, S: np.ndarray, W: np.ndarray, dt: float) -> dict[str, np.ndarray]:
+    """Columns (batch,) of the 90 % bands S +- W: share of the measurements inside at fixed times [%], and over the time
+    steps the mean width and the mean interval score; NaN without a band.
+
+    The interval score is the width, plus 2 / 0.1 times the distance of a measurement outside: the smaller the better.
+    Position counts north and east apart. W is (batch, K, 6).
+
+    Source: Gneiting, Raftery, Strictly proper scoring rules, prediction, and estimation, JASA 102 (2007) 359-378,
+    eq. (43).
+    """
+    error = np.abs(state_error(truth, S))[..., MOTION]
+    inside = np.where(np.isfinite(W), 100.0 * (error <= W), np.nan)
+    score = 2.0 * W + 2.0 / (1.0 - COVERAGE) * np.maximum(error - W, 0.0)
+    found = {}
+    for name, (_, _, channels) in _BAND_CHANNELS.items():
+        for column, knot in horizons(S.shape[1] * dt, dt).items():
+            found[f"{BAND}{name}_{column[3:]}"] = inside[:, knot, channels].mean(axis=-1)
+        found[f"{BAND}{name}_width"] = 2.0 * W[..., channels].mean(axis=(1, 2))
+        found[f"{BAND}{name}_score"] = score[..., channels].mean(axis=(1, 2))
+    return found
 
 
 def divergence(truth: np.ndarray, S: np.ndarray, dt: float) -> list[str]:
@@ -54,9 +88,11 @@ def divergence(truth: np.ndarray, S: np.ndarray, dt: float) -> list[str]:
 
 
 def measure(
-    metrics: Sequence[str], batch: Batch, S: np.ndarray, *, L: float, dt: float, ok: np.ndarray
-) -> dict[str, np.ndarray]:
-    """Score columns (batch,) by name; NaN for the runs that are not `ok` (batch,), which must not be scored."""
+    metrics: Sequence[str], batch: Batch, S: np.ndarray, *, L: float, dt: float, ok: np.ndarray,
+    W: np.ndarray | None = None,
+) -> dict[str, np.ndarray]:  # fmt: skip
+    """Score columns (batch,) by name; NaN for the runs that are not `ok` (batch,), which must not be scored. With the
+    half-widths W (batch, K, 6) of bands also `band_scores`."""
     steps = S.shape[1]
     values: dict[str, np.ndarray] = {}
 
@@ -71,4 +107,6 @@ def measure(
     distance = ed(true=true, pred=pred)
     for column, knot in horizons(steps * dt, dt).items():
         put(column, distance[:, knot])
+    for column, scored in band_scores(true, pred, W[ok], dt).items() if W is not None else ():
+        put(column, scored)
     return values

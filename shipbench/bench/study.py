@@ -104,7 +104,7 @@ class Part:
             ]
             parts = [
                 PROTOCOL, task.key(data.fingerprint), task.metrics, runs, cell.model, cell.fold, cell.seed, files,
-                facts.plugins, facts.code, self.study.metric_plugins,
+                facts.plugins, facts.code, self.study.metric_plugins, task.bands,
             ]  # fmt: skip
             keys.append(hashlib.sha256(json.dumps(parts, default=str).encode()).hexdigest()[:16])
         return keys
@@ -118,8 +118,9 @@ class Part:
         """Job for a worker, without `fold_data`."""
         facts = self.facts
         return Job(
-            self.spec, self.cells[0].seed, facts.code, facts.files if send_files else None, device, facts.foreign
-        )
+            self.spec, self.cells[0].seed, facts.code, facts.files if send_files else None, device, facts.foreign,
+            self.study.task.bands,
+        )  # fmt: skip
 
     def uncovered(self, answer: Answer) -> list[str]:
         """Names of code that the model loaded, and of files that it read, during fit and prediction, that the keys do

@@ -25,7 +25,7 @@ DEFAULT_METRICS = (
     "trial_indices",
 )
 _Seed = Annotated[Whole, Field(ge=0, lt=2**32)]
-_NOT_IDENTITY = {"models", "metrics", "seeds", "title"}
+_NOT_IDENTITY = {"models", "metrics", "seeds", "title", "bands"}
 
 
 class Task(BaseModel):
@@ -38,7 +38,8 @@ class Task(BaseModel):
     `severity`). `stride_s`: distance of the scored windows in runs longer than the horizon (default: they do not
     overlap). `valid_runs`: training runs set aside for early stopping (default: one ninth, 8 of 72). `train_runs`: use
     only that many runs for fitting and early stopping together, the same scored runs (`valid_runs` shrinks in
-    proportion, to one at least). `max_runs`: use only that many runs, evenly spread over the data set.
+    proportion, to one at least). `max_runs`: use only that many runs, evenly spread over the data set. `bands`: score
+    90 % bands, too (see `bands`); every model is fitted five times more, and its prediction stays the same.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
@@ -67,6 +68,7 @@ class Task(BaseModel):
     train_runs: Whole | None = Field(None, ge=2)
     max_runs: Whole | None = Field(None, ge=2)
     fold_seed: _Seed = 0
+    bands: bool = False
     title: str = ""
 
     @field_validator("models", "seeds", "metrics")

@@ -22,11 +22,14 @@ from typing import Any
 import numpy as np
 
 from ..errors import ShipbenchError
+from ..metrics.base import state_error
 from ..predictors._user_file import code_of, files_read, on_import_path
 from ..predictors.base import History, make_predictor
 from ..predictors.physics_model.fit_report import FitReport
 from ..records import Dataset
+from ..signals import MOTION
 from ..specs import Spec
+from .bands import LEAST_GROUPS, band_factor, band_shape, without_parts
 from .cost import count_parameters
 from .provenance import machine
 
@@ -54,6 +57,7 @@ class Job:
     `code`: digests of the packages that it takes (`package_digest`). `files`: content by relative name of the user's
     code or saved folder, where the worker may not have it; None: it is read in place. `device`: where it computes,
     unless its spec says. `foreign`: it runs code that is not shipbench's, so that it needs a process of its own.
+    `bands`: the answer has a 90 % band (see `bands`).
     """
 
     spec: Spec
@@ -62,6 +66,7 @@ class Job:
     files: dict[str, bytes] | None = None
     device: str | None = None
     foreign: bool = False
+    bands: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +76,8 @@ class Answer:
     Args:
         status: "" (predicted, to be scored), "failed" or "skipped", with the `reason`.
         S: prediction (batch, K, 10), or None.
+        W: half-widths (batch, K, 6) of the 90 % band about the motion of S; NaN where there is no band. None where the
+            job asks for none.
         fit_s: time of the fit [s], shared equally by the `shared_by` cells that were fitted together.
         predict_s: time of one rollout [s].
         params: the model's settings, or None if it does not state them.
@@ -95,6 +102,7 @@ class Answer:
     notes: dict[str, Any] = field(default_factory=dict)
     machine: dict[str, Any] = field(default_factory=machine)
     code: dict[str, str] = field(default_factory=dict)
+    W: np.ndarray | None = None
 
 
 def work(job: Job, folds: Sequence[FoldData]) -> list[Answer]:
@@ -165,7 +173,14 @@ def _work(job: Job, folds: Sequence[FoldData]) -> list[Answer]:
     if reason:
         return [Answer("skipped", str(reason)) for _ in folds]
     _seed_global_draws(job.seed)
-    return [_predicted(fit, fold) for fit, fold in zip(_fit(job, folds), folds, strict=True)]
+    fits = _fit(job, folds)
+    answers = [_predicted(fit, fold) for fit, fold in zip(fits, folds, strict=True)]
+    if not job.bands:
+        return answers
+    return [
+        _with_band(answer, job, fit.model, fold) if answer.S is not None else answer
+        for answer, fit, fold in zip(answers, fits, folds, strict=True)
+    ]
 
 
 def _seed_global_draws(seed: int) -> None:
@@ -231,6 +246,47 @@ def _predicted(fit: _Fit, fold: FoldData) -> Answer:
     if isinstance(report := getattr(fit.model, "report", None), FitReport):
         notes["fit_report"] = report.as_dict()
     return Answer("", "", S, fit.seconds, fit.shared_by, predict_s, params, count_parameters(fit.model), files, notes)
+
+
+def _with_band(answer: Answer, job: Job, model: Any, fold: FoldData) -> Answer:
+    """Answer with the band of its prediction, or a note on why it has none."""
+    try:
+        width, reason = _band(job, model, fold)
+    except _RAISED as error:
+        _let_stop_through(error)
+        width, reason = None, one_line(error)
+    if width is not None:
+        return replace(answer, W=width)
+    return replace(
+        answer, W=np.full((*fold.U.shape[:2], 6), np.nan), notes=answer.notes | {"no_band": reason or "unknown"}
+    )
+
+
+def _band(job: Job, model: Any, fold: FoldData) -> tuple[np.ndarray | None, str]:
+    """Half-widths (batch, K, 6) of the band of a fitted model, or None and the reason."""
+    if job.spec.path is not None and job.spec.class_name is None:
+        return None, "a saved model is not fitted again, so that its errors on left-out runs are not known"
+    history = 0 if fold.history is None else fold.history[0].shape[1]
+    folds, truths, groups = [], [], list[str]()
+    for train, valid, out in without_parts(fold.train, fold.valid):
+        batch = out.batch(history)
+        folds.append(FoldData(train, valid, batch.s0, batch.U, batch.history))
+        truths.append(batch.truth)
+        groups += [run.group for run in out.runs]
+    if not folds:
+        return None, f"the training and validation runs are of fewer than {LEAST_GROUPS} groups"
+    _seed_global_draws(job.seed)
+    ratios = []
+    for fit, part, truth in zip(_fit(job, folds), folds, truths, strict=True):
+        if fit.error:
+            return None, f"without some of the runs, {fit.error}"
+        error = np.abs(state_error(truth, _predict(fit.model, part))[..., MOTION])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ratios.append(error / band_shape(fit.model, part.s0.copy(), part.U.copy()))
+    factor = band_factor(np.concatenate(ratios), groups)
+    if not np.isfinite(factor).all():
+        return None, "too many rollouts over left-out runs are not finite"
+    return factor * band_shape(model, fold.s0.copy(), fold.U.copy()), ""
 
 
 def _predict(model: Any, fold: FoldData) -> np.ndarray:

@@ -147,6 +147,9 @@ def run(
     ] = None,
     stride: Annotated[float | None, typer.Option(help="Seconds between scored windows (default: the horizon).")] = None,
     max_runs: Annotated[int | None, typer.Option(help="Use only that many runs, evenly spread.")] = None,
+    bands: Annotated[
+        bool, typer.Option("--bands", help="Score 90 % bands of position and heading, too: five more fits of each.")
+    ] = False,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -193,6 +196,7 @@ def run(
         "models": model or None, "datasets": dataset or None, "folds": folds, "split": split,
         "seeds": parse_seeds(seeds),
         "horizon_s": horizon, "history_s": history, "stride_s": stride, "max_runs": max_runs,
+        "bands": bands or None,
     }  # fmt: skip
     execution = Execution(executor, workers, scheduler, Limits(time_limit, memory_limit), device, wait)
     tasks = load_tasks(config, overrides)

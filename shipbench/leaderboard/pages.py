@@ -74,7 +74,7 @@ def _board(scores: Scores, summaries: list[dict[str, Any]]) -> Board:
     tables.append(board_statistics.comparison_table(scores))
     if len(scores.matched.complete) > 1 and len(scores.ranked) > 1:
         tables.append(board_statistics.pair_table(scores))
-    tables += [board_tables.horizon_table(scores), board_tables.signal_table(scores)]
+    tables += [board_tables.horizon_table(scores), board_tables.signal_table(scores), board_tables.band_table(scores)]
     if scores.rows["kind"].nunique() > 1:
         tables.append(board_tables.kind_table(scores))
     tables += [board_statistics.slice_table(scores), board_statistics.trial_table(scores)]

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..bench.results import STATUSES
+from ..bench.scoring import BAND
 from ..metrics.trial_indices import COLUMNS as TRIAL_COLUMNS
 from ..render.table import Table, TableColumn, display_unit, number, significant
 from .scores import CEILING, STATISTICS, Scores
@@ -142,9 +143,23 @@ def horizon_table(scores: Scores) -> Table:
 
 def signal_table(scores: Scores) -> Table:
     """Table of all other columns: the error of each signal in its own unit."""
-    rest = [c for n, c in scores.columns.items() if n not in _NO_SIGNAL and not n.startswith("ed_at_")]
+    rest = [c for n, c in scores.columns.items() if n not in _NO_SIGNAL and not n.startswith(("ed_at_", BAND))]
     note = "Mean over runs and folds of the root mean square over the run, each in its own unit."
     return _mean_table("Error of each signal", scores, rest, [note])
+
+
+def band_table(scores: Scores) -> Table | None:
+    """Table of the 90 % bands: share of the measurements inside at fixed times [%], mean width, mean interval score;
+    None where no model has a band."""
+    chosen = [c for n, c in scores.columns.items() if n.startswith(BAND)]
+    if not chosen or scores.scored[[c["name"] for c in chosen]].isna().all(axis=None):
+        return None
+    note = (
+        "Mean over runs and folds. Inside: share of the measurements in the band, wanted 90 %; position counts north "
+        "and east apart. Interval score: width of the band plus 20 times the distance of a measurement outside it; "
+        "the smaller the better."
+    )
+    return _mean_table("90 % bands", scores, chosen, [note])
 
 
 def kind_table(scores: Scores) -> Table:

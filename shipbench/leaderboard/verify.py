@@ -13,7 +13,7 @@ from ..bench.cost import count_parameters
 from ..bench.folds import Fold, make_folds, select_runs
 from ..bench.regimes import COLUMNS as FEATURES
 from ..bench.regimes import window_features
-from ..bench.results import Cell, read_predictions, read_truth
+from ..bench.results import Cell, read_band, read_predictions, read_truth
 from ..bench.scoring import divergence, measure
 from ..bench.submissions import Results
 from ..bench.task import make_task
@@ -51,7 +51,7 @@ def verify(results: Results) -> tuple[list[str], list[str]]:
         cell = Cell(summary["dataset"], summary["model"], summary["fold"], summary["seed"])
         own = rows[cell.dataset, cell.model, cell.fold, cell.seed].loc[summary["runs"]["test"]]
         found.data_set(summary, cell, source, own)
-        S, batch = _saved(source, cell)
+        S, batch, W = _saved(source, cell)
         if summary["status"] in ("failed", "skipped"):
             if S is not None:
                 found.differences.append(
@@ -70,27 +70,32 @@ def verify(results: Results) -> tuple[list[str], list[str]]:
             )
             continue
         if found.truth(summary, cell, source, batch, results.windows):  # scores against another truth say nothing
-            found.differences += _compare_scores(summary, cell, own, batch, S)
+            found.differences += _compare_scores(summary, cell, own, batch, S, W)
             found.parameters(summary, cell, source)
     return found.differences, list(found.notes)
 
 
-def _saved(source: Path, cell: Cell) -> tuple[np.ndarray | None, Batch | None]:
-    """Predictions and truth of a cell; None without predictions."""
+def _saved(source: Path, cell: Cell) -> tuple[np.ndarray | None, Batch | None, np.ndarray | None]:
+    """Predictions, truth and band of a cell; None without predictions, or without a band."""
     try:
         S = read_predictions(source, cell)
-        return S, None if S is None else read_truth(source, cell.dataset, cell.fold)
+        return S, None if S is None else read_truth(source, cell.dataset, cell.fold), read_band(source, cell)
     except InputError as error:
         raise InputError(
             f"{source}: the saved truth or predictions of {cell.label} cannot be read: {error} --verify needs them."
         ) from None
 
 
-def _compare_scores(summary: dict[str, Any], cell: Cell, own: Frame, batch: Batch, S: np.ndarray) -> list[str]:
+def _compare_scores(
+    summary: dict[str, Any], cell: Cell, own: Frame, batch: Batch, S: np.ndarray, W: np.ndarray | None
+) -> list[str]:
     reasons = divergence(batch.truth, S, summary["dt"])
     ok = np.array([not reason for reason in reasons])
-    again = measure(summary["task"]["metrics"], batch, S, L=summary["ship_L"], dt=summary["dt"], ok=ok)
+    W = W if summary["task"].get("bands") else None
+    again = measure(summary["task"]["metrics"], batch, S, L=summary["ship_L"], dt=summary["dt"], ok=ok, W=W)
     found = []
+    if summary["task"].get("bands") and W is None:
+        found.append(f"{cell.label}: the rows hold scores of a band, and no band is saved.")
     for i, run in enumerate(batch.ids):
         status, said = "ok" if ok[i] else "diverged", own["status"].iloc[i]
         if said != status:
