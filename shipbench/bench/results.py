@@ -7,7 +7,8 @@ all.
 - `windows.parquet`: one row per scored window: what the true ship does there (see `regimes`). These three files are a
 submission.
 - `truth/<dataset>/fold0.npz`: ids, s0, U and truth of the scored windows (the same for all models).
-- `cells/<dataset>/<model>/fold0-seed0/`: rows.parquet, summary.json, predictions.npz (S; W of bands), equations.txt, model/.
+- `cells/<dataset>/<model>/fold0-seed0/`: rows.parquet, summary.json, predictions.npz (S, and W with bands),
+equations.txt, model/.
 """
 
 from __future__ import annotations
