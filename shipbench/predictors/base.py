@@ -48,6 +48,8 @@ class Predictor(Protocol):
         fit_group: class method `fit_group(models, trains, valids, seeds)`, which fits many at once (folds and seeds) in
             place.
         skip: `skip(dataset)`, the reason why it cannot take a data set, or None.
+        predict_samples: `predict_samples(s0, U, samples)`, random records (samples, batch, K, 6 or 10) of the motion; a
+            band takes its shape from them.
         num_parameters: count of fitted numbers.
         seeded: False where nothing is drawn at random.
         earth_fixed: True where the model knows a place on earth.
