@@ -55,8 +55,10 @@ def study_plots(series: Series, rows: Frame, models: Sequence[str], L: float, B:
     for track in series.tracks:
         mine = by_run[track.run]
         lines = [shown(track.truth, track.truth, signals)]
+        bands: list[dict[str, np.ndarray]] = [{}]
         for model in models:
             predicted = track.predicted.get(model)
+            bands.append(widths(track.widths.get(model), signals))
             if predicted is None:
                 lines.append({})
                 continue
@@ -65,7 +67,7 @@ def study_plots(series: Series, rows: Frame, models: Sequence[str], L: float, B:
         quarters = track.truth[np.linspace(0, len(track.truth) - 1, 5).round().astype(int)]
         hulls = [outline(float(s[X]), float(s[Y]), float(s[PSI]), L, B) for s in quarters]
         cells = [[_error(mine, m), *_fits(track, m)] for m in models]
-        runs.append(linked_run(track.run, str(mine["kind"].iloc[0]), track.t, columns, lines, hulls, cells))
+        runs.append(linked_run(track.run, str(mine["kind"].iloc[0]), track.t, columns, lines, hulls, cells, bands))
     names = [Line("measured", "measured"), *(Line(m, i) for i, m in enumerate(models))]
     histories = ["error", *(q.name for _, _, q in signals)]
     start = _median_run([by_run[track.run] for track in series.tracks])
@@ -79,6 +81,15 @@ def shown(S: np.ndarray, truth: np.ndarray, signals: Sequence[tuple[int, float, 
     turned = S.copy()
     turned[:, PSI] = truth[:, PSI] + wrap_angle(S[:, PSI] - truth[:, PSI])
     return {"east": S[:, Y], "north": S[:, X]} | {q.name: factor * turned[:, i] for i, factor, q in signals}
+
+
+def widths(W: np.ndarray | None, signals: Sequence[tuple[int, float, Quantity]]) -> dict[str, np.ndarray]:
+    """Half-widths (steps, 6) of a band by column, in the units of display; empty where there is no band."""
+    if W is None:
+        return {}
+    return {"east": W[:, Y], "north": W[:, X]} | {
+        q.name: factor * W[:, i] for i, factor, q in signals if i < W.shape[1]
+    }
 
 
 def _fits(track: Track, model: str) -> list[str]:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..bench.results import Cell, read_predictions, read_truth
+from ..bench.results import Cell, read_band, read_predictions, read_truth
 from ..bench.submissions import Results
 from ..errors import InputError
 from ..metrics.base import fit_percent
@@ -30,7 +30,8 @@ class Track:
     """Window: `t` (steps,) [s], `truth` and each model's prediction (steps, 10), order and units of `signals.STATES`,
     the first row at s0.
 
-    `fits`: by model the fit of every signal (10,) [%], over all time steps of the window.
+    `fits`: by model the fit of every signal (10,) [%], over all time steps of the window. `widths`: by model the
+    half-widths (steps, 6) of its 90 % band about the motion, 0 at s0; models without one are left out.
     """
 
     run: str
@@ -38,6 +39,7 @@ class Track:
     truth: np.ndarray
     predicted: dict[str, np.ndarray] = field(default_factory=dict)
     fits: dict[str, np.ndarray] = field(default_factory=dict)
+    widths: dict[str, np.ndarray] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +70,8 @@ def gather(results: Results, dataset: str, models: Sequence[str], points: int = 
     left_out = left_out if rows["seed"].nunique() > 1 else []
     order = rows[rows["status"] == "ok"].groupby("run")["ed"].median().sort_values().index.tolist()
     order += [run for run in dict.fromkeys(rows["run"]) if run not in set(order)]
-    tracks = len(models) + 1  # and the true one
+    banded = any(s["task"].get("bands") for s in results.summaries if s["dataset"] == dataset)
+    tracks = len(models) * (1 + banded) + 1  # and the true one
     kept = max(1, points // (_LEAST * tracks + _WINDOW))
     chosen = set(
         order if len(order) <= kept else [order[i] for i in np.linspace(0, len(order) - 1, kept).round().astype(int)]
@@ -109,7 +112,7 @@ class _Reading:
         cell = Cell(summary["dataset"], summary["model"], summary["fold"], summary["seed"])
         try:
             batch = self._batch(cell, source)
-            S = read_predictions(source, cell)
+            S, W = read_predictions(source, cell), read_band(source, cell)
         except InputError as error:
             reason = " ".join(str(error).split())
             self.missing.append(
@@ -131,7 +134,7 @@ class _Reading:
             return
         ok = np.array([status == "ok" for status in summary["run_status"]])
         self._errors(summary, batch.truth[ok], S[ok])
-        self._tracks(cell.model, batch, S, summary["dt"])
+        self._tracks(cell.model, batch, S, W, summary["dt"])
 
     def _batch(self, cell: Cell, source: Path) -> Batch:
         if (source, cell.fold) not in self._truth:
@@ -144,7 +147,7 @@ class _Reading:
         turned = np.rad2deg(np.abs(wrap_angle(S[:, knots, PSI] - truth[:, knots, PSI])))
         self.errors.setdefault(summary["model"], []).append((ed(true=truth[:, knots], pred=S[:, knots]), turned))
 
-    def _tracks(self, model: str, batch: Batch, S: np.ndarray, dt: float) -> None:
+    def _tracks(self, model: str, batch: Batch, S: np.ndarray, W: np.ndarray | None, dt: float) -> None:
         knots = _thin(S.shape[1] + 1, self.most)
         if len(knots) <= S.shape[1]:
             self.thinned = len(knots)
@@ -155,6 +158,8 @@ class _Reading:
                         run, dt * knots, np.concatenate([batch.s0[i : i + 1], batch.truth[i]])[knots]
                     )
                 self.tracks[run].predicted[model] = np.concatenate([batch.s0[i : i + 1], S[i]])[knots]
+                if W is not None and np.isfinite(W[i]).all():
+                    self.tracks[run].widths[model] = np.concatenate([np.zeros((1, W.shape[2])), W[i]])[knots]
                 self.tracks[run].fits[model] = fit_percent(true=batch.truth[i], pred=S[i])
 
     def series(self, order: Sequence[str], left_out: list[str]) -> Series:

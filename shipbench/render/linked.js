@@ -22,16 +22,20 @@ function linkedPlots(root) {
     let sum = 0;
     return steps && steps.map((step) => (step === null ? null : (sum += step) / 10 ** decimals));
   };
-  const read = (source) => ({
-    ...source,
-    t: unpacked(source.t, 2),
-    values: source.values.map((line) => line && line.map((steps, c) => unpacked(steps, data.columns[c].decimals))),
-  });
+  const lines = (source) => source && source.map((line) => line && line.map((steps, c) => unpacked(steps, data.columns[c].decimals)));
+  const read = (source) => ({ ...source, t: unpacked(source.t, 2), values: lines(source.values), bands: lines(source.bands) });
   const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
   const stroke = (role) => (role === "measured"
     ? { color: css("--ink"), width: 4 }
     : { color: css(`--c${role % LINKED_COLOURS}`), width: 2, dash: LINKED_DASHES[(role + Math.floor(role / LINKED_COLOURS)) % LINKED_DASHES.length] });
-  const shown = (role) => (off.has(role) ? "legendonly" : true);
+  const banded = () => data.series.filter((series, s) => run.bands?.[s]?.some((half) => half) && !off.has(series.role));
+  const shown = (role) => { // a band stands alone: several would hide one another
+    if (role.band !== undefined) return banded().length === 1 && !off.has(role.band);
+    return off.has(role) ? "legendonly" : true;
+  };
+  const band = (role) => ({
+    mode: "lines", fill: "toself", fillcolor: `${css(`--c${role % LINKED_COLOURS}`)}2e`, line: { width: 0 }, meta: { band: role }, visible: shown({ band: role }), hoverinfo: "skip", showlegend: false,
+  });
   const within = (t) => range === null || (t >= range[0] && t <= range[1]);
   const base = () => ({
     paper_bgcolor: css("--paper"), plot_bgcolor: css("--paper"), font: { color: css("--ink"), family: "system-ui, sans-serif", size: 12 },
@@ -49,6 +53,15 @@ function linkedPlots(root) {
     data.series.forEach((series, s) => {
       const line = run.values[s];
       if (!line || !line.some((values) => values)) return;
+      const wide = run.bands?.[s];
+      if (wide?.[east.i] && wide[north.i]) { // rectangles at the quarters of the run
+        const last = run.t.length - 1;
+        const at = [1, 2, 3, 4].map((q) => Math.round((q * last) / 4)).filter((k) => within(run.t[k]) && line[east.i][k] !== null);
+        const corners = (centre, half, signs) => at.flatMap((k) => [...signs.map((sign) => centre[k] + sign * half[k]), null]);
+        traces.push({
+          ...band(series.role), x: corners(line[east.i], wide[east.i], [-1, 1, 1, -1, -1]), y: corners(line[north.i], wide[north.i], [-1, -1, 1, 1, -1]),
+        });
+      }
       const onTrack = line[east.i] !== null; // a series of histories alone stands in the legend
       const keep = onTrack ? run.t.map((t, k) => k).filter((k) => within(run.t[k])) : [];
       traces.push({
@@ -92,6 +105,15 @@ function linkedPlots(root) {
       data.series.forEach((series, s) => {
         const line = run.values[s];
         if (!line || !line[quantity.i]) return;
+        const half = run.bands?.[s]?.[quantity.i];
+        if (half) {
+          const keep = run.t.map((t, k) => k).filter((k) => line[quantity.i][k] !== null);
+          const back = keep.toReversed();
+          traces.push({
+            ...band(series.role), x: [...keep, ...back].map((k) => run.t[k]), xaxis: "x", yaxis: `y${id}`,
+            y: [...keep.map((k) => line[quantity.i][k] + half[k]), ...back.map((k) => line[quantity.i][k] - half[k])],
+          });
+        }
         traces.push({
           x: run.t, y: line[quantity.i], xaxis: "x", yaxis: `y${id}`, name: escaped(short(series.name)), meta: series.role, mode: "lines", line: stroke(series.role),
           visible: shown(series.role), opacity: series.role === "measured" ? 0.5 : 1, hovertemplate: `%{y:.${quantity.decimals}f} ${quantity.unit}`,

@@ -7,12 +7,14 @@ The contract, as JSON in the page (macro `linked` of `macros.html.j2`):
               switch `data-toggle`)
     track     names of the columns east and north [m], or null for a page without tracks
     histories names of the columns that are drawn against time, from the top
-    runs      one entry for each run: `name`, `note`, `t`, `values[series][column]`, `outlines`, `cells[model]`
+    runs      one entry for each run: `name`, `note`, `t`, `values[series][column]`, `outlines`, `cells[model]`, and
+              `bands[series][column]` where a series has a band: half-widths about its values. A band is drawn while
+              no other series with a band is switched on
     start     the number of the run shown first
 
-`t` [s, two decimals] and each `values[series][column]` are whole numbers in the last decimal: the first one, then the
-steps from the last finite value; null where nothing is drawn; a whole column that a series does not have is null.
-`outlines` are closed polygons [[east...], [north...]] [m]. `cells` are texts for elements with
+`t` [s, two decimals], each `values[series][column]` and each of `bands` are whole numbers in the last decimal: the
+first one, then the steps from the last finite value; null where nothing is drawn; a whole column that a series does not
+have is null. `outlines` are closed polygons [[east...], [north...]] [m]. `cells` are texts for elements with
 `data-cell="model-number"`.
 """
 
@@ -84,6 +86,7 @@ def linked_run(
     lines: Sequence[Mapping[str, np.ndarray]],
     outlines: Sequence[np.ndarray] = (),
     cells: Sequence[Sequence[str]] = (),
+    bands: Sequence[Mapping[str, np.ndarray]] = (),
 ) -> dict[str, Any]:
     """Data of one run in the contract.
 
@@ -94,8 +97,10 @@ def linked_run(
         lines: for each series its columns (n,) by name, in the units of `columns`; one that is missing is not drawn.
         outlines: closed polygons (points, 2), east and north [m].
         cells: texts for each model.
+        bands: for each series the half-widths (n,) of its band by column, in the units of `columns`; or nothing.
     """
-    values = [[packed(line[c.name], c.decimals) if c.name in line else None for c in columns] for line in lines]
+    drawn = {"bands": [_packed(band, columns) for band in bands]} if any(bands) else {}
+    values = [_packed(line, columns) for line in lines]
     rings = [np.round(ring.T, 1).tolist() for ring in outlines]
     return {
         "name": name,
@@ -104,7 +109,12 @@ def linked_run(
         "values": values,
         "outlines": rings,
         "cells": [list(row) for row in cells],
+        **drawn,
     }
+
+
+def _packed(line: Mapping[str, np.ndarray], columns: Sequence[Quantity]) -> list[list[int | None] | None]:
+    return [packed(line[c.name], c.decimals) if c.name in line else None for c in columns]
 
 
 def linked_plots(

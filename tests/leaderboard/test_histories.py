@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from shipbench.leaderboard.histories import SIGNALS, near, shown
+from shipbench.leaderboard.histories import EAST, NORTH, SIGNALS, near, shown, widths
+from shipbench.render.linked import linked_run
 from shipbench.signals import PSI, X, Y
 
 
@@ -40,3 +41,18 @@ def test_a_heading_is_shown_on_the_turn_of_the_true_one_in_degrees():
     columns = shown(predicted, truth, SIGNALS)
     assert columns["psi"] == pytest.approx(np.full(11, 360.0 + np.rad2deg(0.2)))
     assert columns["north"].tolist() == list(range(11))
+
+
+def test_the_half_widths_of_a_band_stand_in_the_units_of_its_columns():
+    W = np.arange(1.0, 7.0) * np.ones((11, 1))
+    found = widths(W, SIGNALS)
+    assert {name: values[0] for name, values in found.items()} == {
+        "north": 1.0, "east": 2.0, "psi": pytest.approx(np.rad2deg(3.0)), "u": 4.0, "v": 5.0,
+        "r": pytest.approx(np.rad2deg(6.0)),
+    }  # fmt: skip
+    assert widths(None, SIGNALS) == {}
+    columns = [EAST, NORTH]
+    lines, bands = [{"east": W[:, 0], "north": W[:, 1]}, {"east": W[:, 0]}], [{}, {"east": W[:, 4]}]
+    run = linked_run("r", "", np.arange(11.0), columns, lines, bands=bands)
+    assert run["bands"] == [[None, None], [[50] + [0] * 10, None]]
+    assert "bands" not in linked_run("r", "", np.arange(11.0), columns, lines, bands=[{}, {}])

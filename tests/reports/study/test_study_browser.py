@@ -8,6 +8,10 @@ import pytest
 from chromium import CONTRAST, browse
 from hostile import HOSTILE, page_of
 
+from shipbench.bench.runner import run_tasks
+from shipbench.bench.task import make_task
+from shipbench.reports.study.page import write_report
+
 BOARD = "#d0-board ~ .scroll"
 ORDER = f"[...document.querySelector('{BOARD} tbody').rows].map(r => r.cells[1].textContent)"
 TRACK, HISTORIES = "document.querySelector('[data-track]')", "document.querySelector('[data-histories]')"
@@ -155,3 +159,24 @@ def test_it_fits_a_laptop_and_a_phone_light_and_dark(page, width, scheme, tmp_pa
 def test_nothing_of_a_hostile_name_runs(page):
     asked = ["js", "[window.alerted ?? 0, document.images.length, document.scripts.length, document.title]"]
     assert browse([["open", page, 1280], asked])[1] == [0, 0, 5, "Study of ship-motion prediction"]
+
+
+def test_the_band_of_a_model_is_drawn_while_it_is_the_only_one(toy, tmp_path, monkeypatch):
+    monkeypatch.setattr("shipbench.bench.runner.load_dataset", lambda name: toy(runs=12))
+    file = tmp_path / "models.py"
+    file.write_text("from shipbench.predictors.hold import Hold\nclass Other(Hold):\n    pass\n")
+    models = ["hold", f"{file}:Other"]
+    task = make_task({"dataset": "toy", "models": models, "horizon_s": 20, "folds": 4, "bands": True})
+    outcome = run_tasks([task], tmp_path / "out")
+    page = str(write_report(outcome.results, tmp_path / "page.html", "shipbench report").path)
+    bands = "t => t.meta && t.meta.band !== undefined"
+    drawn = f"[{TRACK}, {HISTORIES}].map(box => box.data.filter({bands}).map(t => [t.meta.band, t.visible]))"
+    messages, both, _, one, _, again = browse([
+        ["open", page, 1280], ["js", drawn], ["click", "#d0 input[data-toggle='1']"], ["js", drawn],
+        ["click", "#d0 input[data-toggle='1']"], ["js", drawn],
+    ])  # fmt: skip
+    assert messages == []
+    assert [len(box) for box in both] == [2, 8]  # on the track, and of u, v, r and psi
+    assert not any(visible for box in both for _, visible in box)
+    assert all(visible == (model == 0) for box in one for model, visible in box)
+    assert again == both
