@@ -67,7 +67,8 @@ def benchmark(
         workers: number of processes of the executor "processes".
         device: where networks compute: "cpu", "cuda" or "cuda:1".
         quiet: show no progress.
-        options: other keys of a `Task`, such as history_s=10, split="kind", stride_s=30, max_runs=20, metrics=["ed"].
+        options: other keys of a `Task`, such as history_s=10, split="kind", stride_s=30, max_runs=20, bands=True,
+            metrics=["ed"].
 
     Raises:
         InputError: a model, data set or option cannot be used, or `out` holds another study; nothing has been fitted

@@ -257,9 +257,7 @@ def _with_band(answer: Answer, job: Job, model: Any, fold: FoldData) -> Answer:
         width, reason = None, one_line(error)
     if width is not None:
         return replace(answer, W=width)
-    return replace(
-        answer, W=np.full((*fold.U.shape[:2], 6), np.nan), notes=answer.notes | {"no_band": reason or "unknown"}
-    )
+    return replace(answer, W=np.full((*fold.U.shape[:2], 6), np.nan), notes=answer.notes | {"no_band": reason})
 
 
 def _band(job: Job, model: Any, fold: FoldData) -> tuple[np.ndarray | None, str]:

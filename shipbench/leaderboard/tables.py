@@ -150,16 +150,20 @@ def signal_table(scores: Scores) -> Table:
 
 def band_table(scores: Scores) -> Table | None:
     """Table of the 90 % bands: share of the measurements inside at fixed times [%], mean width, mean interval score;
-    None where no model has a band."""
+    None where no study asked for bands."""
     chosen = [c for n, c in scores.columns.items() if n.startswith(BAND)]
-    if not chosen or scores.scored[[c["name"] for c in chosen]].isna().all(axis=None):
+    if not chosen:
         return None
     note = (
         "Mean over runs and folds. Inside: share of the measurements in the band, wanted 90 %; position counts north "
         "and east apart. Interval score: width of the band plus 20 times the distance of a measurement outside it; "
         "the smaller the better."
     )
-    return _mean_table("90 % bands", scores, chosen, [note])
+    notes = [note]
+    without = scores.scored.groupby("model")[chosen[-1]["name"]].count().eq(0)
+    if without.any():
+        notes.append("A dash: no band. The reason is `no_band` in summary.json, if the study asked for bands.")
+    return _mean_table("90 % bands", scores, chosen, notes)
 
 
 def kind_table(scores: Scores) -> Table:

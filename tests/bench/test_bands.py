@@ -134,6 +134,7 @@ def test_a_study_with_bands_has_the_same_predictions_and_one_more_table(study, t
     assert not any(c.startswith(BAND) for c in plain.rows)
     tables = [t.title for t in build_board(outcome.results, "toy").tables]
     assert "90 % bands" in tables
+    assert "no_band" not in str(outcome.summaries)
     assert "90 % bands" not in [t.title for t in build_board(plain.results, "toy").tables]
     s = outcome.summaries[0]
     width = read_band(tmp_path / "out", Cell("toy", s["model"], 0, 0))
@@ -161,7 +162,8 @@ def test_a_model_that_cannot_be_fitted_to_fewer_runs_has_its_scores_and_no_band(
     assert (outcome.rows["status"] == "ok").all()
     assert outcome.rows[[c for c in outcome.rows if c.startswith(BAND)]].isna().all(axis=None)
     assert "too few runs" in outcome.summaries[0]["no_band"]
-    assert "90 % bands" not in [t.title for t in build_board(outcome.results, "toy").tables]
+    table = next(t for t in build_board(outcome.results, "toy").tables if t.title == "90 % bands")
+    assert "`no_band` in summary.json" in table.notes[-1]
 
 
 def test_too_few_runs_say_so(study):
