@@ -28,9 +28,11 @@ from ..estimation.gears import fit_gears, gears_of
 from ..estimation.laplace import Fit
 from ..estimation.priors import PRIORS
 from ..estimation.refinement import refined_on, refinement_length
-from ..estimation.rollout import Active, Course, Vessel
+from ..estimation.rollout import Active, Course, Vessel, accelerations
 from ..estimation.term import Given, Term
+from ..ops import Array
 from ..physics.actuators import Gear, gear_path
+from ..physics.modifiers import Flow
 from ..records import Dataset
 from ..signals import ACTUATORS, COMMANDS, MOTION
 from ..specs import EffectSpec
@@ -193,6 +195,31 @@ class Calibrated(FittedShip):
     def _active(self, enters: str) -> list[Acting]:
         return [] if self.extension is None else self.extension.active(enters)
 
+    def _formula(self, base: np.ndarray, forces: Sequence[Acting]) -> tuple[list[Array], list[Active]]:
+        """Values of p0..p10, the effects `forces`, and the changes of hull and structure, for coefficients `base`."""
+        p, ship = parameters(self._scales(), base)
+        return p, [*(Active(a.effect, a.q) for a in flow_first(forces)), *ship]
+
+    def forces(self) -> tuple[Sequence[Array], list[Acting]]:
+        """Calibrated p0..p10, the effects of the spec that act as forces, and the changes of hull and structure."""
+        p, active = self._formula(self.calibration.base, self._active("force"))
+        return p, [Acting(a.effect, a.q) for a in active]
+
+    def accelerations(
+        self, flow: Flow, wind: tuple[Array, Array] | None, p: Sequence[Array], active: Sequence[Acting]
+    ) -> tuple[Array, ...]:
+        """Accelerations of eq. (2) with all that is calibrated, in deep water; without measured wind the air is
+        still."""
+        return accelerations(
+            (flow.x, flow.y, flow.psi, flow.u, flow.v, flow.r),
+            (flow.n, flow.delta, flow.F_b, flow.F_s),
+            flow.t,
+            wind,
+            p,
+            [Active(a.effect, a.q) for a in active],
+            Vessel(self.particulars, self.c),
+        )
+
     def _motion(
         self, start: np.ndarray, U: np.ndarray, path: np.ndarray, base: np.ndarray, forces: Sequence[Acting],
         w: np.ndarray | None = None,
@@ -205,16 +232,14 @@ class Calibrated(FittedShip):
         wind = self._wind(U)
         air = None if wind is None else np.swapaxes(wind, 0, 1)
         course = Course(Vessel(self.particulars, self.c), self.dt / self.substeps, np.ascontiguousarray(t), air)
-        p, ship = parameters(self._scales(), base)
+        p, active = self._formula(base, forces)
         depth = {"depth": U[..., self.inputs.index("depth")].mean(axis=1)} if self.shallow else {}
         act = np.moveaxis(path.reshape(B, K, self.substeps, 3, 4), 1, 0)
         push = np.zeros((K, B, self.substeps, 3, 3))
         if w is not None:
             ends = np.swapaxes(w, 0, 1)[:, :, None, None]
             push = (1.0 - part[..., None]) * ends[:-1] + part[..., None] * ends[1:]
-        named = [Active(a.effect, a.q) for a in flow_first(forces)]
-        active = [*named, *ship, *known_effects(depth, self.particulars)]
-        return course.rolled(start[:, MOTION], p, active, act, push)
+        return course.rolled(start[:, MOTION], p, [*active, *known_effects(depth, self.particulars)], act, push)
 
     def predict_samples(self, s0: np.ndarray, U: np.ndarray, samples: int = 100, *, seed: int = 0) -> np.ndarray:
         """Random records of the motion that is to come; quantiles over samples are bands of what will be measured.

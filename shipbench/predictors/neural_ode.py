@@ -27,6 +27,7 @@ from ..specs import EffectSpec
 from ._numbers import RATE, ROUNDS, WEIGHT, WIDTH, check_numbers
 from ._saved import check_shapes
 from .base import History, PredictorBase
+from .calibrated import Calibrated
 from .device import check_device
 from .networks.residual import Drive, Grid, Residual, features, solve, typical_accelerations
 from .networks.stacked import (
@@ -43,6 +44,10 @@ from .networks.stacked import (
 from .networks.training import Chunk, Recipe, StackedTask, train
 from .physics import Physics
 from .physics_model.fit_report import FitReport
+from .physics_model.fitted_ship import FittedShip
+
+BASES: dict[str, type[FittedShip]] = {"physics": Physics, "calibrated": Calibrated}
+"""Fitted physics that a residual may be added to."""
 
 
 class Stage(NamedTuple):
@@ -125,6 +130,7 @@ class NeuralODE(PredictorBase):
     """Physics plus learned residual accelerations.
 
     Args:
+        base: the fitted physics, "physics" or "calibrated"; its coefficients stay fixed while the residual is trained.
         hidden: width of the two hidden layers.
         lr: Adam's first step size (a cosine reduces it to a fiftieth).
         epochs: number of validations, each after 20 minibatches.
@@ -135,6 +141,7 @@ class NeuralODE(PredictorBase):
 
     name: ClassVar[str] = "neural_ode"
     needs: ClassVar[tuple[str, ...]] = ("torch", "lightning", "torchdiffeq")
+    base: str = "physics"
     hidden: int = 32
     lr: float = 5e-3
     epochs: int = 40
@@ -144,8 +151,10 @@ class NeuralODE(PredictorBase):
 
     def __post_init__(self) -> None:
         check_device(self.device)
+        if self.base not in tuple(BASES):
+            raise ValueError(f"base = {self.base!r}; accepted: {', '.join(BASES)}")
         check_numbers(self, {"hidden": WIDTH, "epochs": ROUNDS, "lr": RATE, "penalty": WEIGHT, "weight_decay": WEIGHT})
-        self.physics = Physics()
+        self.physics: FittedShip = BASES[self.base]()
         self.effects: tuple[EffectSpec, ...] = ()
         self._weights: dict[str, np.ndarray] = {}
         self.improved = False
@@ -159,13 +168,13 @@ class NeuralODE(PredictorBase):
             InputError: an effect is unknown, acts on the sensors, or depends on place or time, which the training
                 windows do not know.
         """
-        self.physics = Physics().extend(effects)
+        self.physics = BASES[self.base]().extend(effects)
         for effect in effects:
             part = EFFECTS.get(effect.name)
             if part.traits.local or part.enters == "sensor":
                 raise InputError(
                     f"effect '{effect.name}' cannot extend neural_ode: it acts on the sensors, or at a place or time. "
-                    f"Accepted: effects that act as forces or on actuators. Write physics+{effect.name}, or "
+                    f"Accepted: effects that act as forces or on actuators. Write {self.base}+{effect.name}, or "
                     "correct the data."
                 )
         self.effects = tuple(effects)
@@ -211,8 +220,16 @@ class NeuralODE(PredictorBase):
         pairs = [with_valid(t, v, s) for t, v, s in zip(trains, valids, seeds, strict=True)]
         for model, (training, validation), seed in zip(models, pairs, seeds, strict=True):
             model.inputs = training.inputs
-            model.physics = Physics().extend(model.effects) if model.effects else Physics()
+            model.physics = BASES[model.base]()
+            if model.effects:
+                model.physics.extend(model.effects)
             model.physics.fit(training, validation, seed=seed)
+            if model.physics.shallow:
+                raise InputError(
+                    f"neural_ode[base={model.base}] cannot be trained on '{training.name}': its base depends on the "
+                    f"measured water depth, which the residual does not know. Accepted: data in deep water, or "
+                    f"without the channel depth. Write {model.base}, or neural_ode."
+                )
         physics = [m.physics for m in models]
         grid = Grid.of(physics[0])
         learn, check = (Drive.of(physics, part, grid) for part in zip(*pairs, strict=True))

@@ -6,6 +6,7 @@ Source: the source paper, eq. (2) to (9).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
@@ -14,8 +15,10 @@ import numpy as np
 from ..errors import WorkError
 from ..estimation.actuator_fit import fit_actuators
 from ..estimation.eq2_rollout import Rolling
-from ..estimation.extension import Extension, measured, roll, true_start
+from ..estimation.extension import Active, Extension, accelerations, measured, roll, true_start
 from ..estimation.gears import fit_gears
+from ..ops import Array
+from ..physics.modifiers import Flow
 from ..records import Batch, Dataset
 from ..signals import ACTUATORS, COMMANDS, MOTION
 from ._numbers import check_numbers
@@ -65,7 +68,6 @@ class Physics(FittedShip):
         if isinstance(self.piece, bool) or not isinstance(self.piece, (int, float)) or not 0.0 <= self.piece < np.inf:
             raise ValueError(f"piece = {self.piece}; accepted: 0 (whole runs), or a time in s")
         self.held: dict[int, str] = {}
-        self.report: FitReport | None = None
 
     @property
     def fitted(self) -> bool:
@@ -162,6 +164,16 @@ class Physics(FittedShip):
     def _path_under(self, extension: Extension, batch: Batch) -> np.ndarray:
         self.extension = extension
         return self.actuator_path(batch.s0, batch.U)
+
+    def forces(self) -> tuple[Sequence[Array], list[Active]]:
+        """Fitted p0..p10, and the effects of the spec that act as forces."""
+        return self.p, [] if self.extension is None else list(self.extension.active("force"))
+
+    def accelerations(
+        self, flow: Flow, wind: tuple[Array, Array] | None, p: Sequence[Array], active: Sequence[Active]
+    ) -> tuple[Array, ...]:
+        """Accelerations of eq. (2) with effects; without measured wind there is no air resistance."""
+        return accelerations(active, flow, wind, self.c, p, self.particulars)
 
     def _rolling(self) -> Rolling:
         columns = (*range(len(COMMANDS)), *self._wind_columns())

@@ -11,14 +11,13 @@ import torch
 import torchdiffeq
 from torch import Tensor, nn
 
-from ...estimation.extension import Active, accelerations
-from ...physics import eq2
+from ...estimation.extension import Active
 from ...physics.modifiers import Flow
 from ...physics.wind import apparent_wind
 from ...records import Dataset
 from ...signals import PSI, R, U, V
 from .._features import CHANNELS
-from ..physics import Physics
+from ..physics_model.fitted_ship import FittedShip
 from .stacked import Scaler, StackedMLP
 
 Air = tuple[Tensor, Tensor]
@@ -39,20 +38,20 @@ class Residual(nn.Module):
 
     def __init__(
         self,
-        physics: Sequence[Physics],
+        physics: Sequence[FittedShip],
         hidden: int,
         scale_in: Scaler,
         scale_out: Tensor,
         draw: Sequence[torch.Generator],
     ) -> None:
         super().__init__()
-        self.c, self.ship = physics[0].c, physics[0].particulars
-        forces = [_forces(m) for m in physics]
-        self.effects = [(a.effect, len(a.q)) for a in forces[0]]
-        q = np.array([[v for a in own for v in a.q] for own in forces])
+        found = [m.forces() for m in physics]
+        self.base = physics[0]
+        self.effects = [(a.effect, len(a.q)) for a in found[0][1]]
+        q = np.array([[v for a in active for v in a.q] for _, active in found])
         self.register_buffer("q", torch.as_tensor(q, dtype=scale_out.dtype).T[..., None].contiguous())
         self.register_buffer(
-            "p", torch.as_tensor(np.stack([m.p for m in physics]), dtype=scale_out.dtype).T[..., None].contiguous()
+            "p", torch.as_tensor(np.array([p for p, _ in found]), dtype=scale_out.dtype).T[..., None].contiguous()
         )
         self.register_buffer("scale_out", scale_out)
         self.scale_in = scale_in
@@ -68,22 +67,12 @@ class Residual(nn.Module):
     ) -> tuple[Tensor, Tensor, Tensor]:
         """Accelerations (du, dv, dr), each (members, batch); `air` is true wind speed and direction."""
         apparent = None if air is None or psi is None else apparent_wind(psi, u, v, *air)
-        n, delta, F_b, F_s = actuators
-        if self.effects and psi is not None:
-            q = iter(self.q.unbind(0))
-            active = [Active(effect, tuple(next(q) for _ in range(num))) for effect, num in self.effects]
-            nowhere = torch.zeros_like(u)
-            flow = Flow(nowhere, nowhere, nowhere, psi, u, v, r, n, delta, F_b, F_s)
-            du, dv, dr = accelerations(active, flow, air, self.c, self.p.unbind(0), self.ship)
-        else:
-            du, dv, dr = eq2.accelerations(u, v, r, n, delta, F_b, F_s, apparent, self.c, self.p.unbind(0))
+        q = iter(self.q.unbind(0))
+        active = [Active(effect, tuple(next(q) for _ in range(num))) for effect, num in self.effects]
+        flow = Flow(0.0, 0.0, 0.0, psi, u, v, r, *actuators)
+        du, dv, dr = self.base.accelerations(flow, air, self.p.unbind(0), active)
         more = (self.learned(torch.stack([u, v, r, *actuators, *(apparent or ())], dim=-1)) * self.scale_out).unbind(-1)
         return du + more[0], dv + more[1], dr + more[2]
-
-
-def _forces(physics: Physics) -> list[Active]:
-    """Effects of a fitted model that act as forces."""
-    return [] if physics.extension is None else list(physics.extension.active("force"))
 
 
 def features(S: Tensor, air: Tensor | None) -> Tensor:
@@ -106,7 +95,7 @@ class Grid(NamedTuple):
     step: float
 
     @classmethod
-    def of(cls, physics: Physics) -> Grid:
+    def of(cls, physics: FittedShip) -> Grid:
         """Grid with steps of about a second for 100 m (the time scale of a ship goes with sqrt(L)). No step misses a
         change of the inputs."""
         if physics.substeps > 1:
@@ -131,7 +120,7 @@ class Drive(NamedTuple):
     counts: tuple[int, ...]
 
     @classmethod
-    def of(cls, physics: Sequence[Physics], datasets: Sequence[Dataset], grid: Grid) -> Drive:
+    def of(cls, physics: Sequence[FittedShip], datasets: Sequence[Dataset], grid: Grid) -> Drive:
         """Inputs of the rollouts. Actuators do not depend on the hull's motion: their path is computed before the
         rollout."""
         parts, counts, d = [], [], grid.stride
@@ -187,12 +176,12 @@ def solve(model: Residual, start: Tensor, path: Tensor, air: Tensor | None, step
     return torchdiffeq.odeint(rate, first, times, method="midpoint")[1:, :3].permute(2, 3, 0, 1)
 
 
-def typical_accelerations(physics: Sequence[Physics], drive: Drive) -> Tensor:
+def typical_accelerations(physics: Sequence[FittedShip], drive: Drive) -> Tensor:
     """Root mean square (members, 1, 3) of the physics' accelerations without measured wind along the measured
     states."""
     sizes = []
     for model, S in zip(physics, drive.S.double().split(drive.counts), strict=True):
         flow = Flow(0.0, 0.0, 0.0, S[..., PSI].numpy(), *S[..., CHANNELS].movedim(-1, 0).numpy())
-        found = accelerations(_forces(model), flow, None, model.c, list(model.p), model.particulars)
+        found = model.accelerations(flow, None, *model.forces())
         sizes.append([float(np.sqrt(np.mean(np.square(a)))) for a in found])
     return torch.tensor(sizes, dtype=torch.float32)[:, None]

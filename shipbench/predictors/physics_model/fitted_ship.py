@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any, Self
@@ -10,15 +11,18 @@ import numpy as np
 
 from ...estimation.actuator_fit import DEFAULT_ACTUATORS
 from ...estimation.eq2_rollout import actuators_after
-from ...estimation.extension import Extension, extension_of, geared, no_gear
+from ...estimation.extension import Active, Extension, extension_of, geared, no_gear
 from ...estimation.gears import gears_of
+from ...ops import Array
 from ...physics import eq2
+from ...physics.modifiers import Flow
 from ...records import Dataset
 from ...ship import Ship, complete
 from ...signals import ACTUATORS, COMMANDS
 from ...specs import EffectSpec
 from .._saved import check_shapes, sample_time
 from ..base import PredictorBase
+from .fit_report import FitReport
 
 ACTUATOR_PARAMETERS = (
     ("T_n", "shaft time constant", "s"), ("rate_n", "shaft rate limit", "rpm/s"),
@@ -31,6 +35,24 @@ class FittedShip(PredictorBase):
     """Base of the models with fitted physics; `_set_ship` says which ship."""
 
     extension: Extension | None = None
+    report: FitReport | None = None
+    """Report of the fit on its own runs, where there is one."""
+    shallow: bool = False
+    """Whether the accelerations depend on a measured water depth."""
+
+    @abstractmethod
+    def forces(self) -> tuple[Sequence[Array], list[Active]]:
+        """Fitted values of p0..p10, and the effects that act as forces with theirs."""
+
+    @abstractmethod
+    def accelerations(
+        self, flow: Flow, wind: tuple[Array, Array] | None, p: Sequence[Array], active: Sequence[Active]
+    ) -> tuple[Array, ...]:
+        """Accelerations (du, dv, dr) [m/s^2, m/s^2, rad/s^2] with the values that `forces` returns, or with values
+        of several models.
+
+        wind: true wind speed [m/s] and direction [rad], or None.
+        """
 
     def extend(self, effects: Sequence[EffectSpec]) -> Self:
         """Add effects to the fitted model (`physics+current`): their formulas are those of `shipbench.effects`.
