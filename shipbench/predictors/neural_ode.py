@@ -1,4 +1,4 @@
-"""The fitted physics plus a learned residual acceleration, trained through the solver of torchdiffeq on windows that
+"""A fitted physics plus a learned residual acceleration, trained through the solver of torchdiffeq on windows that
 grow in length.
 
 The residual is a small network of (u, v, r, n, delta, F_b, F_s), and of the velocity through the air where wind is

@@ -9,6 +9,8 @@ import torch
 from shipbench.errors import InputError
 from shipbench.physics.wind import apparent_wind
 from shipbench.predictors import neural_ode
+from shipbench.predictors.base import make_predictor
+from shipbench.predictors.calibrated import Calibrated
 from shipbench.predictors.networks.residual import Drive, Grid, Residual, features, solve, typical_accelerations
 from shipbench.predictors.networks.stacked import Scaler, generators
 from shipbench.predictors.neural_ode import NeuralODE
@@ -77,8 +79,14 @@ def test_where_validation_does_not_improve_the_physics_itself_is_kept(parts, phy
     np.testing.assert_allclose(useless.physics.p, physics.p)
 
 
-def test_the_training_solver_agrees_with_the_rollout(parts, physics):
-    train = parts[0]
+@pytest.fixture(scope="module")
+def hybrid(parts, weak_resistance):
+    return NeuralODE(base="calibrated", epochs=2, hidden=8).fit(parts[0], parts[1], seed=0)
+
+
+@pytest.mark.parametrize("base", ["physics", "calibrated"])
+def test_the_training_solver_agrees_with_the_rollout(parts, physics, hybrid, base):
+    train, physics = parts[0], {"physics": physics, "calibrated": hybrid.physics}[base]
     grid = Grid.of(physics)
     drive = Drive.of([physics], [train], grid)
     residual = Residual(
@@ -195,6 +203,69 @@ def test_a_saved_model_keeps_its_physics(parts, model, tmp_path):
     loaded = NeuralODE.load(tmp_path / "m")
     np.testing.assert_array_equal(loaded.predict(batch.s0, batch.U), model.predict(batch.s0, batch.U))
     np.testing.assert_array_equal(loaded.physics.p, model.physics.p)
+
+
+def test_a_calibrated_base_is_the_predictor_calibrated_on_the_same_runs(parts, hybrid):
+    batch, base = parts[2].batch(), Calibrated().fit(parts[0], parts[1], seed=0)
+    np.testing.assert_allclose(hybrid.physics.calibration.base, base.calibration.base, rtol=1e-6, atol=1e-8)
+    zero = NeuralODE(base="calibrated", hidden=8)
+    weights = {k: np.zeros_like(v) if "layers.2" in k else v for k, v in hybrid._weights.items()}
+    zero.physics, zero._weights, zero.improved = hybrid.physics, weights, True
+    expected = base.predict(batch.s0, batch.U)
+    np.testing.assert_allclose(zero.predict(batch.s0, batch.U), expected, rtol=1e-5, atol=1e-4)
+
+
+def test_on_validation_runs_no_residual_is_worse_than_its_calibrated_base(parts, hybrid):
+    assert position_error(hybrid, parts[1]) <= position_error(hybrid.physics, parts[1]) + 1e-3  # errors of the solvers
+    useless = NeuralODE(base="calibrated", hidden=8, epochs=1, lr=30.0, penalty=0.0).fit(parts[0], parts[1], seed=0)
+    assert not useless.improved
+    assert position_error(useless, parts[2]) == position_error(useless.physics, parts[2])
+
+
+def test_a_saved_model_keeps_its_calibrated_base(parts, hybrid, tmp_path):
+    batch = parts[2].batch()
+    hybrid.save(tmp_path / "m")
+    loaded = NeuralODE.load(tmp_path / "m")
+    assert isinstance(loaded.physics, Calibrated)
+    np.testing.assert_array_equal(loaded.predict(batch.s0, batch.U), hybrid.predict(batch.s0, batch.U))
+
+
+@pytest.mark.long
+def test_effects_of_a_calibrated_base_act_in_training_and_in_rollouts(windy, tmp_path):
+    """Two members with a current and a measured wind: each keeps its own coefficients."""
+    train, valid, test = windy
+    effects = [EffectSpec("current", {}), EffectSpec("rudder_lag", {})]
+    group = [NeuralODE(base="calibrated", epochs=2, hidden=8).extend(effects) for _ in range(2)]
+    NeuralODE.fit_group(group, [train, train.subset(range(9))], [valid, valid], [0, 1])
+    batch, bases = test.batch(), [model.physics for model in group]
+    drive = Drive.of(bases, [test, test], Grid.of(bases[0]))
+    together = Residual(bases, 8, Scaler.fit([features(drive.S[:, :-1], drive.air)] * 2),
+                        typical_accelerations(bases, drive), generators([0, 1]))  # fmt: skip
+    runs = torch.arange(len(drive.S)).view(2, -1)
+    with torch.no_grad():
+        found = solve(together, drive.S[runs][:, :, 0], drive.path[runs], drive.air[runs], Grid.of(bases[0]).step)
+    for velocity, base in zip(found.numpy(), bases, strict=True):
+        truth = base.predict(batch.s0, batch.U)[..., VELOCITY]
+        assert np.abs(velocity - truth).max(axis=(0, 1)) == pytest.approx(np.zeros(3), abs=5e-3)
+    group[0].save(tmp_path / "m")
+    assert NeuralODE.load(tmp_path / "m").effects == tuple(effects)
+
+
+def test_what_a_base_cannot_be_is_refused(parts, monkeypatch):
+    with pytest.raises(InputError, match=r"base = 'mmg'; accepted: physics, calibrated"):
+        make_predictor("neural_ode[base=mmg]")
+    with pytest.raises(InputError, match="fits the hull's coefficients already"):
+        make_predictor("neural_ode[base=calibrated]+hull_derivatives")
+    with pytest.raises(InputError, match=r"calibrated\+heading_bias"):
+        make_predictor("neural_ode[base=calibrated]+heading_bias")
+
+    def shallow(self, train, valid=None, *, seed=0):
+        self.shallow = True
+        return self
+
+    monkeypatch.setattr(Calibrated, "fit", shallow)
+    with pytest.raises(InputError, match="water depth"):
+        NeuralODE(base="calibrated").fit(parts[0], parts[1])
 
 
 def test_coarse_and_fine_samples_get_steps_that_fit_the_ship(physics):
