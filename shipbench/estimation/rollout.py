@@ -203,6 +203,58 @@ class Course:
         return _built[own]
 
 
+@dataclass(frozen=True)
+class Slopes:
+    """Machine code of the accelerations by forces and of their derivatives with respect to psi, u, v, r, for gradients
+    through a rollout.
+
+    Args:
+        code: of both, over lanes.
+        numbers: of the ship and of the effects themselves.
+    """
+
+    code: Lanes
+    numbers: np.ndarray
+
+    @classmethod
+    def of(cls, active: Sequence[Active], vessel: Vessel, wind: bool) -> Slopes | None:
+        """Code for these effects, with or without measured wind; None where there is none: use the formula itself."""
+        import casadi as ca
+
+        from ..compiled import Lanes
+
+        try:
+            rates = _traced(active, vessel, wind, steps=False, any_ship=False)
+        except (RuntimeError, TypeError, ValueError):
+            return None
+        given = rates.sx_in()
+        found = rates(*given)
+        both = ca.densify(
+            ca.vertcat(found, ca.vec(ca.jacobian(found, given[0])[:, 2:].T))
+        )  # code has a place for zeros
+        code = Lanes.of(ca.Function("slopes", given, [both], {"cse": True}))
+        return None if code is None else cls(code, np.array([0.0, *_numbers(active, vessel)]))
+
+    def __call__(
+        self, state: np.ndarray, values: np.ndarray, act: np.ndarray, wind: np.ndarray | None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Accelerations (D, B, 3), and their derivatives (D, B, 3, 4).
+
+        Args:
+            state: psi, u, v, r (D, B, 4).
+            values: p0..p10 and those of the effects (D, num).
+            act: n, delta, F_b, F_s (D, B, 4).
+            wind: speed and direction (D, B, 2), or None.
+        """
+        D, B = state.shape[:2]
+        x = np.concatenate([np.zeros((D, B, 2)), state], axis=-1)
+        lanes = [a[:, None, :, None] for a in (x, act, *(() if wind is None else (wind,)))]
+        out = np.empty((D, 1, B, 15))
+        time = np.zeros(1)
+        self.code([lanes[0], values[:, None, None, None], self.numbers, lanes[1], time, *lanes[2:]], (D, 1, B, 1), out)
+        return out[:, 0, :, :3], out[:, 0, :, 3:].reshape(D, B, 3, 4)
+
+
 def accelerations(
     state: Sequence[Array],
     act: Array,

@@ -28,7 +28,7 @@ from ..estimation.gears import fit_gears, gears_of
 from ..estimation.laplace import Fit
 from ..estimation.priors import PRIORS
 from ..estimation.refinement import refined_on, refinement_length
-from ..estimation.rollout import Active, Course, Vessel, accelerations
+from ..estimation.rollout import Active, Course, Slopes, Vessel, accelerations
 from ..estimation.term import Given, Term
 from ..ops import Array
 from ..physics.actuators import Gear, gear_path
@@ -219,6 +219,11 @@ class Calibrated(FittedShip):
             [Active(a.effect, a.q) for a in active],
             Vessel(self.particulars, self.c),
         )
+
+    def slopes(self) -> Slopes | None:
+        """Machine code of `accelerations` and of their derivatives; None where there is no compiler."""
+        active = self._formula(self.calibration.base, self._active("force"))[1]
+        return Slopes.of(active, Vessel(self.particulars, self.c), bool(self._wind_columns()))
 
     def _motion(
         self, start: np.ndarray, U: np.ndarray, path: np.ndarray, base: np.ndarray, forces: Sequence[Acting],

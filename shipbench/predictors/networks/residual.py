@@ -4,7 +4,7 @@ of measured runs."""
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import torch
@@ -12,6 +12,7 @@ import torchdiffeq
 from torch import Tensor, nn
 
 from ...estimation.extension import Active
+from ...estimation.rollout import Slopes
 from ...physics.modifiers import Flow
 from ...physics.wind import apparent_wind
 from ...records import Dataset
@@ -21,6 +22,25 @@ from ..physics_model.fitted_ship import FittedShip
 from .stacked import Scaler, StackedMLP
 
 Air = tuple[Tensor, Tensor]
+
+
+class _Compiled(torch.autograd.Function):
+    """Accelerations (members, batch, 3) as machine code; of their derivatives only those with respect to the state
+    psi, u, v, r (members, batch, 4) are needed: the coefficients are fixed."""
+
+    @staticmethod
+    def forward(ctx: Any, state: Tensor, code: Slopes, values: Tensor, act: Tensor, wind: Tensor | None) -> Tensor:
+        given = (state, values, act)
+        rates, slopes = code(
+            *(a.detach().double().numpy() for a in given), None if wind is None else wind.double().numpy()
+        )
+        ctx.save_for_backward(torch.as_tensor(slopes, dtype=state.dtype))
+        return torch.as_tensor(rates, dtype=state.dtype)
+
+    @staticmethod
+    def backward(ctx: Any, *grads: Tensor) -> tuple[Tensor, None, None, None, None]:
+        (slopes,) = ctx.saved_tensors
+        return (grads[0][..., None, :] @ slopes)[..., 0, :], None, None, None, None
 
 
 class Residual(nn.Module):
@@ -46,7 +66,7 @@ class Residual(nn.Module):
     ) -> None:
         super().__init__()
         found = [m.forces() for m in physics]
-        self.base = physics[0]
+        self.base, self.code = physics[0], physics[0].slopes()
         self.effects = [(a.effect, len(a.q)) for a in found[0][1]]
         q = np.array([[v for a in active for v in a.q] for _, active in found])
         self.register_buffer("q", torch.as_tensor(q, dtype=scale_out.dtype).T[..., None].contiguous())
@@ -67,10 +87,15 @@ class Residual(nn.Module):
     ) -> tuple[Tensor, Tensor, Tensor]:
         """Accelerations (du, dv, dr), each (members, batch); `air` is true wind speed and direction."""
         apparent = None if air is None or psi is None else apparent_wind(psi, u, v, *air)
-        q = iter(self.q.unbind(0))
-        active = [Active(effect, tuple(next(q) for _ in range(num))) for effect, num in self.effects]
-        flow = Flow(0.0, 0.0, 0.0, psi, u, v, r, *actuators)
-        du, dv, dr = self.base.accelerations(flow, air, self.p.unbind(0), active)
+        if self.code is not None and psi is not None and u.device.type == "cpu":
+            state, act = torch.stack([psi, u, v, r], dim=-1), torch.stack(list(actuators), dim=-1)
+            wind = None if air is None else torch.stack(air, dim=-1)
+            du, dv, dr = _Compiled.apply(state, self.code, torch.cat([self.p, self.q])[..., 0].T, act, wind).unbind(-1)
+        else:
+            q = iter(self.q.unbind(0))
+            active = [Active(effect, tuple(next(q) for _ in range(num))) for effect, num in self.effects]
+            flow = Flow(0.0, 0.0, 0.0, psi, u, v, r, *actuators)
+            du, dv, dr = self.base.accelerations(flow, air, self.p.unbind(0), active)
         more = (self.learned(torch.stack([u, v, r, *actuators, *(apparent or ())], dim=-1)) * self.scale_out).unbind(-1)
         return du + more[0], dv + more[1], dr + more[2]
 

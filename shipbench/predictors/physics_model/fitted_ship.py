@@ -13,6 +13,7 @@ from ...estimation.actuator_fit import DEFAULT_ACTUATORS
 from ...estimation.eq2_rollout import actuators_after
 from ...estimation.extension import Active, Extension, extension_of, geared, no_gear
 from ...estimation.gears import gears_of
+from ...estimation.rollout import Slopes
 from ...ops import Array
 from ...physics import eq2
 from ...physics.modifiers import Flow
@@ -53,6 +54,10 @@ class FittedShip(PredictorBase):
 
         wind: true wind speed [m/s] and direction [rad], or None.
         """
+
+    def slopes(self) -> Slopes | None:
+        """Machine code of `accelerations` and of their derivatives, or None: then use the formula itself."""
+        return None
 
     def extend(self, effects: Sequence[EffectSpec]) -> Self:
         """Add effects to the fitted model (`physics+current`): their formulas are those of `shipbench.effects`.
