@@ -219,21 +219,12 @@ class Slopes:
     @classmethod
     def of(cls, active: Sequence[Active], vessel: Vessel, wind: bool) -> Slopes | None:
         """Code for these effects, with or without measured wind; None where there is none: use the formula itself."""
-        import casadi as ca
-
-        from ..compiled import Lanes
-
-        try:
-            rates = _traced(active, vessel, wind, steps=False, any_ship=False)
-        except (RuntimeError, TypeError, ValueError):
-            return None
-        given = rates.sx_in()
-        found = rates(*given)
-        both = ca.densify(
-            ca.vertcat(found, ca.vec(ca.jacobian(found, given[0])[:, 2:].T))
-        )  # code has a place for zeros
-        code = Lanes.of(ca.Function("slopes", given, [both], {"cse": True}))
-        return None if code is None else cls(code, np.array([0.0, *_numbers(active, vessel)]))
+        numbers = np.array([0.0, *_numbers(active, vessel)])
+        key = ("slopes", wind, *((a.effect, len(a.q)) for a in active), *numbers)
+        if key not in _built:
+            _built[key] = _sloped(active, vessel, wind)
+        code = _built[key]
+        return None if code is None else cls(code, numbers)
 
     def __call__(
         self, state: np.ndarray, values: np.ndarray, act: np.ndarray, wind: np.ndarray | None
@@ -323,6 +314,22 @@ def _compiled(active: Sequence[Active], vessel: Vessel, wind: bool, steps: bool,
         return Lanes.of(_traced(active, vessel, wind, steps, any_ship))
     except (RuntimeError, TypeError, ValueError):
         return None
+
+
+def _sloped(active: Sequence[Active], vessel: Vessel, wind: bool) -> Lanes | None:
+    """Compile the accelerations with their derivatives; None as of `_compiled`."""
+    import casadi as ca
+
+    from ..compiled import Lanes
+
+    try:
+        rates = _traced(active, vessel, wind, steps=False, any_ship=False)
+    except (RuntimeError, TypeError, ValueError):
+        return None
+    given = rates.sx_in()
+    found = rates(*given)
+    both = ca.vertcat(found, ca.vec(ca.jacobian(found, given[0])[:, 2:].T))
+    return Lanes.of(ca.Function("slopes", given, [ca.densify(both)], {"cse": True}))  # zeros have their place
 
 
 def _traced(active: Sequence[Active], vessel: Vessel, wind: bool, steps: bool, any_ship: bool) -> casadi.Function:

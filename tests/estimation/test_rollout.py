@@ -10,11 +10,12 @@ import pytest
 from shipbench import kept_code
 from shipbench.effects.base import EFFECTS, Effect, Parameter
 from shipbench.estimation import rollout as rolling
-from shipbench.estimation.coefficients import NUM_BASE
+from shipbench.estimation.coefficients import NUM_BASE, ShipScales, parameters
 from shipbench.estimation.forward import Plant, cut
 from shipbench.estimation.linearisation import Linearisation, Point, Scales
 from shipbench.estimation.open_loop import rollout_plant
 from shipbench.estimation.term import Term
+from shipbench.physics import eq2
 from shipbench.physics.mmg import load_mmg_ship
 from shipbench.records import Dataset, Run
 from shipbench.ship import complete
@@ -196,3 +197,26 @@ def test_an_effect_that_takes_no_symbols_goes_through_numpy(plant):
     moved = plant.roll(x0, [0.0] * 11, active, np.zeros((len(x0), plant.steps + 1, 3)))
     assert moved[0, 1, 3] > plant.roll(x0, [0.0] * 11, [], np.zeros((len(x0), plant.steps + 1, 3)))[0, 1, 3]
     assert push.shape == (plant.steps, len(x0), plant.substeps, 3, 3)
+
+
+@pytest.mark.parametrize("wind", [None, (7.0, 0.8)])
+def test_slopes_are_those_of_the_accelerations(wind):
+    """Rates and central differences of the formula, for a calibrated ship with a current, at 20 states."""
+    rng, ship = np.random.default_rng(1), complete(load_mmg_ship("kcs").particulars)
+    vessel = rolling.Vessel(ship, eq2.coefficients(ship))
+    p, active = parameters(ShipScales.of(ship, vessel.c, True), 0.5 * rng.standard_normal(NUM_BASE))
+    active.append(rolling.Active(EFFECTS.get("current"), (0.4, -0.3)))
+    slopes = rolling.Slopes.of(active, vessel, wind is not None)
+    state = rng.uniform([-3.0, 2.0, -1.0, -0.02], [3.0, 8.0, 1.0, 0.02], (1, 20, 4))
+    act = rng.uniform([-60.0, -0.5, 0.0, 0.0], [100.0, 0.5, 1e4, 1e4], (1, 20, 4))
+    values = np.array([[*p, *(v for a in active for v in a.q)]], dtype=float)
+
+    def formula(at: np.ndarray) -> np.ndarray:
+        x = (0.0, 0.0, *np.moveaxis(at, -1, 0))
+        return np.stack(rolling.accelerations(x, np.moveaxis(act, -1, 0), 0.0, wind, p, active, vessel), axis=-1)
+
+    rates, found = slopes(state, values, act, None if wind is None else np.broadcast_to(wind, (1, 20, 2)))
+    np.testing.assert_allclose(rates, formula(state), rtol=1e-9, atol=1e-12)
+    h = 1e-6 * np.eye(4)
+    differences = np.stack([(formula(state + d) - formula(state - d)) / 2e-6 for d in h], axis=-1)
+    np.testing.assert_allclose(found, differences, rtol=1e-4, atol=1e-7)

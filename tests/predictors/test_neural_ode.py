@@ -215,6 +215,20 @@ def test_a_calibrated_base_is_the_predictor_calibrated_on_the_same_runs(parts, h
     np.testing.assert_allclose(zero.predict(batch.s0, batch.U), expected, rtol=1e-5, atol=1e-4)
 
 
+def test_machine_code_of_a_calibrated_base_has_the_gradients_of_its_formula(parts, hybrid):
+    """Without a compiler, or on a GPU, torch differentiates the formula."""
+    drive = Drive.of([hybrid.physics], [parts[0]], Grid.of(hybrid.physics))
+    residual = hybrid._residual()
+    start, path, code = drive.S[None, :, 0].double(), drive.path[None, :, :10].double(), residual.code
+    found = []
+    for residual.code in (code, None):
+        first = start.clone().requires_grad_()
+        end = solve(residual, first, path, None, 1.0)
+        found.append((end.detach(), *torch.autograd.grad((end * torch.arange(1.0, 4.0)).sum(), first)))
+    for compiled, formula in zip(*found, strict=True):
+        torch.testing.assert_close(compiled, formula, rtol=1e-6, atol=1e-9)
+
+
 def test_on_validation_runs_no_residual_is_worse_than_its_calibrated_base(parts, hybrid):
     assert position_error(hybrid, parts[1]) <= position_error(hybrid.physics, parts[1]) + 1e-3  # errors of the solvers
     useless = NeuralODE(base="calibrated", hidden=8, epochs=1, lr=30.0, penalty=0.0).fit(parts[0], parts[1], seed=0)
