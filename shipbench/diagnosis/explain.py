@@ -11,7 +11,7 @@ import numpy as np
 
 from ..checking.units import UnitFinding
 from ..effects.base import EFFECTS, Effect, aliases_of, searched_by
-from ..estimation.coefficients import FREE, HULL, NUM_HULL, hull_changes
+from ..estimation.coefficients import HULL
 from ..estimation.laplace import Fit
 from ..estimation.term import Term
 from .actuators.kinds import GearFinding
@@ -19,7 +19,7 @@ from .evaluation.forces import force_of_hull, force_of_term
 from .evaluation.run_values import goes_with, of_runs
 from .preparation.time_offsets import LateVelocities, late_effects, late_velocities_effect
 from .result import Cause, Estimate, Gain, what_it_is
-from .selection.agreement import covariance, inflation
+from .selection.agreement import covariance
 from .selection.analysis import Analysis
 from .selection.ship_file import whatever_the_ship
 from .selection.stepwise import CONFUSED
@@ -193,18 +193,13 @@ def _with_motion(gear: Cause, motion: Sequence[Cause]) -> Cause:
 
 
 def _hull_cause(found: Analysis, gain: Gain | None) -> Cause:
-    from scipy.stats import t
-
-    fit = found.final
-    at = np.arange(len(FREE), len(FREE) + NUM_HULL)
-    half = float(t.ppf(0.975, max(fit.plant.seg.runs - 1, 1)))
-    wider = np.maximum(1.0, inflation(fit, at)) ** 0.5
-    mean, reach = fit.solution.mean[at], half * np.sqrt(np.diag(fit.solution.cov)[at]) * wider
-    values = zip(HULL.parameters, *(hull_changes(z).tolist() for z in (mean, mean - reach, mean + reach)), strict=True)
-    parameters = {p.name: Estimate(value, p.unit, (low, high)) for p, value, low, high in values}
-    evidence = "A hull within 30 % of the regressions explains the runs better than one within 3 %."
-    score = found.hull
-    return Cause(HULL.name, 0, score, p_of(found, score), parameters, (), "", gain, evidence, force=force_of_hull(fit))
+    """Cause without sizes: runs do not identify single coefficients (docs/calibration.md#sizes-of-calibration)."""
+    evidence = (
+        "A hull within 30 % of the regressions explains the runs better than one within 3 %. These runs do not "
+        "identify single coefficients."
+    )
+    score, force = found.hull, force_of_hull(found.final)
+    return Cause(HULL.name, 0, score, p_of(found, score), {}, (), "", gain, evidence, force=force)
 
 
 def _unit_cause(rank: int, u: UnitFinding) -> Cause:

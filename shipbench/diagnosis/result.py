@@ -23,12 +23,24 @@ class Estimate:
 
 
 @dataclass(frozen=True)
+class Moved:
+    """Quantity that the ship's coefficients give together, such as her speed at a shaft speed: relative change from the
+    ship file to the calibrated ship, with its 95 % interval; spreads: the same in prior standard deviations."""
+
+    coefficient: str
+    change: float
+    unit: str
+    ci95: tuple[float, float]
+    spreads: float
+
+
+@dataclass(frozen=True)
 class Calibrated:
     """Mean position error ED [m] of open-loop rollouts: `before`, of the ship file's model, and `after`, with the
     ship's own coefficients calibrated.
 
     ci95: interval of `after` over runs. seconds: longest rollout. held_out: whether every run was predicted by a model
-    that was fitted to others.
+    that was fitted to others. moved: quantities of the calibrated ship that differ from those of her file.
     """
 
     before: float
@@ -36,6 +48,7 @@ class Calibrated:
     ci95: tuple[float, float]
     seconds: float
     held_out: bool
+    moved: tuple[Moved, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -162,7 +162,7 @@ def test_a_hidden_current_is_sized_and_pays_on_runs_that_were_not_fitted(driftin
     assert cause.parameters["speed"].value == pytest.approx(np.hypot(0.25, 0.2), rel=0.15)
     assert np.sin(cause.parameters["to"].value - np.arctan2(-0.2, 0.25)) == pytest.approx(0.0, abs=0.15)
     assert verdict.gain is not None
-    assert verdict.gain.relative > 0.2
+    assert verdict.gain.relative > 0.15  # beside the calibrated ship, which absorbs a part of it
     assert verdict.gain.ci95[0] > 0.0
     assert {c.effect for c in verdict.candidates} == set(EFFECTS.names())
     assert verdict.what_is_wrong

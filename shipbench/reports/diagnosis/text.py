@@ -185,7 +185,7 @@ def headline(d: Diagnosis) -> str:
             "runs could have shown."
         )
     return (
-        "Nothing found beyond ordinary differences between ships: no effect of the library and no unexplained "
+        "Nothing found beyond the ship's own coefficients: no effect of the library and no unexplained "
         "dependence. "
         "The detection limits state what these runs could have shown."
     )
@@ -201,6 +201,11 @@ def calibration_words(d: Diagnosis) -> str:
         f"In open-loop rollouts of at most {c.seconds:.0f} s on {where}, the ship file's model is {figure(c.before)} m "
         f"off on average. With the ship's own coefficients calibrated it is {figure(c.after)} m off "
         f"(95 %: {figure(c.ci95[0], 2)} to {figure(c.ci95[1], 2)} m)."
+        + "".join(
+            f" The calibrated ship's {m.coefficient} is {_changed(m.change)} than the ship file's "
+            f"(95 %: {_between(*m.ci95, 'smaller', 'larger')})."
+            for m in c.moved
+        )
     )
 
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 from made_diagnosis import CAUSE, GAIN, make_diagnosis
 
-from shipbench.diagnosis.result import Calibrated, Cause, Estimate
+from shipbench.diagnosis.result import Calibrated, Cause, Estimate, Moved
 from shipbench.effects.base import EFFECTS
 from shipbench.reports.diagnosis.text import (
     calibration_words,
@@ -123,10 +123,14 @@ def test_without_a_cause_the_next_command_tries_the_calibrated_ship():
 
 @pytest.mark.parametrize(("held_out", "where"), [(True, "held-out runs"), (False, "the runs that were fitted")])
 def test_the_errors_of_ship_file_and_calibrated_ship_are_always_stated(held_out, where):
-    own = Calibrated(15.74, 0.467, (0.251, 0.828), 120.0, held_out)
+    turn = Moved("yaw rate with 10° of rudder at 110 rpm", 0.444, "1", (0.4, 0.493), 0.7)
+    own = Calibrated(15.74, 0.467, (0.251, 0.828), 120.0, held_out, (turn,))
     text = " ".join(" ".join(summary_lines(replace(make_diagnosis("none"), calibration=own))).split())
     assert f"rollouts of at most 120 s on {where}, the ship file's model is 15.7 m off on average" in text
     assert "it is 0.467 m off (95 %: 0.25 to 0.83 m)" in text
+    assert (
+        "yaw rate with 10° of rudder at 110 rpm is 44 % larger than the ship file's (95 %: 40 to 49 % larger)" in text
+    )
     assert calibration_words(make_diagnosis()) == ""
 
 
