@@ -21,7 +21,7 @@ THRESHOLDS = Thresholds(
     # shares of evidence, and what is reported
     Threshold("reported_share", 0.05, "share", "least part of a whole that is reported", "what-is-reported"),
     # sizes that matter
-    Threshold("form_of_behaviour", 0.0125, "share", "error of a fitted form in speed and turns", "sizes-of-calibration"),
+    Threshold("form_of_behaviour", 0.0125, "share", "error of a fitted form in speed, turns", "sizes-of-calibration"),
     Threshold("noticeable_force", 0.14, "force scales", "size of a practically significant force", "latent-force"),
     # record and runs
     Threshold("segment_length", 60.0, "s at 130 m", "length of a segment of the record", "chosen-by-judgement"),
