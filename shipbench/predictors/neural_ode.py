@@ -3,7 +3,8 @@ grow in length.
 
 The residual is a small network of (u, v, r, n, delta, F_b, F_s), and of the velocity through the air where wind is
 measured, whose output starts at exactly zero: training starts at the fitted physics and the weights of the best
-validation rollout are kept, the untouched physics among them.
+validation rollout are kept, the untouched physics among them. On `calibrated` the residual acts only where its
+gain exceeds its standard error over the validation runs.
 
 Source: Chen et al. (2018), Neural ordinary differential equations, NeurIPS 31.
 """
@@ -35,6 +36,7 @@ from .networks.stacked import (
     generators,
     hold_error,
     padded,
+    position_errors,
     position_score,
     random_windows,
     shares_of,
@@ -48,6 +50,9 @@ from .physics_model.fitted_ship import FittedShip
 
 BASES: dict[str, type[FittedShip]] = {"physics": Physics, "calibrated": Calibrated}
 """Fitted physics that a residual may be added to."""
+MARGINS = {"physics": 0.0, "calibrated": 1.0}
+"""Standard errors over the validation runs that the gain of a residual has to exceed, by the base. `physics` lacks known
+forces; beside `calibrated` the rule is that of its own refinement."""
 
 
 class Stage(NamedTuple):
@@ -77,6 +82,7 @@ class _Windows(StackedTask):
             stages,
         )
         self.draw, self.penalty, self.members = draw, penalty, len(training.counts)
+        self.first: Tensor | None = None  # errors of the base on the validation runs
         self.dt = grid.step * grid.per_knot
         self.scale = {s.steps: hold_error(training.S, training.counts, self.dt, s.steps) for s in stages}
 
@@ -120,9 +126,30 @@ class _Windows(StackedTask):
         return error.mean((1, 2)) + self.penalty * small.mean(1)
 
     def scores(self) -> Tensor:
+        pose, truth, weight = self._validated()
+        if self.first is None:
+            self.first = position_errors(pose, truth).detach().cpu()
+        return position_score(pose, truth, weight)
+
+    def _validated(self) -> tuple[Tensor, Tensor, Tensor]:
+        """Predicted and measured pose of the validation runs, and the runs' weights."""
         runs, weight = padded(self.validation.counts)
         _, pose, truth, _ = self._roll(self.validation, runs, torch.zeros_like(runs), self.validation.S.shape[1] - 1)
-        return position_score(pose, truth, weight.to(pose.device))
+        return pose, truth, weight.to(pose.device)
+
+    @torch.no_grad()
+    def pays(self, margin: float) -> list[bool]:
+        """Whether the gain of each member over its base exceeds `margin` standard errors over the validation runs; any
+        gain counts where there is a single run."""
+        if self.first is None:
+            return [False] * self.members
+        pose, truth, _ = self._validated()
+        gains = self.first - position_errors(pose, truth).cpu()
+        found = []
+        for gain, count in zip(gains, self.validation.counts, strict=True):
+            error = float(gain[:count].std()) / count**0.5 if count > 1 else 0.0
+            found.append(float(gain[:count].mean()) > margin * error)
+        return found
 
 
 @dataclass
@@ -158,8 +185,8 @@ class NeuralODE(PredictorBase):
         self.effects: tuple[EffectSpec, ...] = ()
         self._weights: dict[str, np.ndarray] = {}
         self.improved = False
-        """Whether validation preferred the trained residual; otherwise the predictions are those of the physics
-        alone."""
+        """Whether the trained residual pays on validation runs (`MARGINS`); otherwise the predictions are those of the
+        physics alone."""
 
     def extend(self, effects: Sequence[EffectSpec]) -> Self:
         """Add effects to the physics (`neural_ode+race_gain`), as in `Physics.extend`.
@@ -251,12 +278,13 @@ class NeuralODE(PredictorBase):
             threads=1,
         )
         train(task, recipe)
+        pays = task.pays(MARGINS[lead.base])
         state = {k: v.detach().cpu().numpy() for k, v in residual.state_dict().items()}
         for m, model in enumerate(models):
             model._weights = {
                 k: v[:, m : m + 1].copy() if k in ("p", "q") else v[m : m + 1].copy() for k, v in state.items()
             }
-            model.improved = bool(np.any(model._weights["net.layers.2.weight"]))
+            model.improved = pays[m]
 
     def _residual(self) -> Residual:
         """Fitted accelerations of this one member in float64."""

@@ -204,10 +204,15 @@ def random_windows(
     return torch.stack(runs), torch.stack([torch.randint(starts, (batch,), generator=g) for g in draw])
 
 
+def position_errors(pose: Tensor, truth: Tensor) -> Tensor:
+    """Mean position error over time (members, runs) [m] of pose and truth (members, runs, steps, >= 2)."""
+    return torch.linalg.vector_norm(pose[..., :2] - truth[..., :2], dim=-1).mean(2)
+
+
 def position_score(pose: Tensor, truth: Tensor, weight: Tensor) -> Tensor:
     """Mean position error of each member [m]: pose and truth (members, runs, steps, >= 2), weight (members, runs)
     summing to 1."""
-    return (torch.linalg.vector_norm(pose[..., :2] - truth[..., :2], dim=-1).mean(2) * weight).sum(1)
+    return (position_errors(pose, truth) * weight).sum(1)
 
 
 def shares_of(total: int, shares: Sequence[float]) -> list[int]:
