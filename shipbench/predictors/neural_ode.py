@@ -51,8 +51,8 @@ from .physics_model.fitted_ship import FittedShip
 BASES: dict[str, type[FittedShip]] = {"physics": Physics, "calibrated": Calibrated}
 """Fitted physics that a residual may be added to."""
 MARGINS = {"physics": 0.0, "calibrated": 1.0}
-"""Standard errors over the validation runs that the gain of a residual has to exceed, by the base. `physics` lacks known
-forces; beside `calibrated` the rule is that of its own refinement."""
+"""Standard errors over the validation runs that the gain of a residual has to exceed, by the base. `physics` lacks
+known forces; beside `calibrated` the rule is that of its own refinement."""
 
 
 class Stage(NamedTuple):

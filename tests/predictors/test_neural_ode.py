@@ -215,6 +215,16 @@ def test_a_calibrated_base_is_the_predictor_calibrated_on_the_same_runs(parts, h
     np.testing.assert_allclose(zero.predict(batch.s0, batch.U), expected, rtol=1e-5, atol=1e-4)
 
 
+@pytest.mark.parametrize(("gains", "pays"), [([0.1, 0.1], True), ([0.4, -0.2], False), ([0.1], True), ([-0.1], False)])
+def test_a_gain_has_to_exceed_its_standard_error_over_validation_runs(monkeypatch, gains, pays):
+    task = object.__new__(neural_ode._Windows)
+    torch.nn.Module.__init__(task)
+    task.validation, task.first = Drive(None, None, None, (len(gains),)), torch.ones(1, len(gains))
+    monkeypatch.setattr(task, "_validated", lambda: (None, None, None))
+    monkeypatch.setattr(neural_ode, "position_errors", lambda *_: 1.0 - torch.tensor([gains]))
+    assert task.pays(1.0) == [pays]
+
+
 def test_machine_code_of_a_calibrated_base_has_the_gradients_of_its_formula(parts, hybrid):
     """Without a compiler, or on a GPU, torch differentiates the formula."""
     drive = Drive.of([hybrid.physics], [parts[0]], Grid.of(hybrid.physics))
