@@ -9,7 +9,7 @@ import numpy as np
 from ..physics.actuators import Gear
 from ..records import Dataset
 from ..ship import complete
-from .calibration import Calibration, refined, some_of
+from .calibration import Calibration, refined
 from .forward import MOST_STEPS
 from .linearisation import Scales
 from .open_loop import distance, rollout_plant
@@ -21,18 +21,14 @@ _LENGTHS = (60.0, 240.0)
 def refinement_length(train: Dataset, valid: Dataset, gears: Mapping[str, Gear], start: Calibration) -> float | None:
     """Length of the rollouts [s] whose refinement of `start`, a calibration to `train`, predicts the validation runs
     best; None where no gain exceeds its standard error over these runs (the rule of one standard error), as of a single
-    run.
-
-    As few rollouts take part as pieces in a first estimate.
-    """
+    run."""
     if len(valid) < 2:
         return None
     froude = (complete(train.ship).L / 130.0) ** 0.5
     test = rollout_plant(valid, dict(gears), _LENGTHS[-1] * froude)
     before, gains = distance(test, Scales(test), start)[0], {}
     for seconds in (froude * length for length in _LENGTHS):
-        plant = some_of(rollout_plant(train, dict(gears), seconds))
-        gain = before - distance(test, Scales(test), refined(plant, Scales(plant), start))[0]
+        gain = before - distance(test, Scales(test), refined_on(train, gears, seconds, start))[0]
         if gain.mean() > gain.std(ddof=1) / np.sqrt(len(gain)):
             gains[seconds] = gain.mean()
     return max(gains, key=gains.__getitem__, default=None)

@@ -19,7 +19,15 @@ import numpy as np
 from ..effects.base import flow_first
 from ..errors import InputError, WorkError
 from ..estimation.actuator_fit import fit_actuators
-from ..estimation.calibration import Calibration, Pushes, calibrated, calibration_of, estimated, some_of
+from ..estimation.calibration import (
+    Calibration,
+    Pushes,
+    calibrated,
+    calibration_of,
+    calibration_without,
+    estimated,
+    some_of,
+)
 from ..estimation.coefficients import FREE, NUM_BASE, NUM_HULL, ShipScales, hull_changes, parameters
 from ..estimation.extension import ACTUATOR_OF, Extension, measured, true_start
 from ..estimation.extension import Active as Acting
@@ -94,10 +102,11 @@ class Calibrated(FittedShip):
         self.shallow = bool(plant.water)
         self.gears = self._fit_gears(data, plant)
         first = self._first(some_of(Plant.of(train)))
-        seconds = None
+        found, seconds = calibrated(plant, first, first.model.terms), None
         if self.refine and valid is not None:
-            seconds = refinement_length(train, valid, self.gears, calibration_of(first))
-        model = refined_on(data, self.gears, seconds, calibration_of(calibrated(plant, first, first.model.terms)))
+            start = calibration_without(found, range(len(train), len(data)))
+            seconds = refinement_length(train, valid, self.gears, start)
+        model = refined_on(data, self.gears, seconds, calibration_of(found))
         if not np.isfinite(model.base).all():
             raise WorkError(
                 f"the calibration of '{train.name}' found no finite estimate; check units and signs with `shipbench "
