@@ -261,7 +261,7 @@ class NeedsSize(Drift):
         ("hodl", {}, "Did you mean 'hold'"),
         ({"mine": "hold"}, {}, "'mine' names a spec, which is its own name"),
         ([], {}, "no model is given"),
-        ("hold", {"hurry": True}, "benchmark has no parameter 'hurry'. Accepted: data, device"),
+        ("hold", {"hurry": True}, "benchmark has no parameter 'hurry'. Accepted: bands, data, device"),
         ("hold", {"horizon_s": 30}, "no parameter 'horizon_s'. Did you mean 'horizon'"),
         ("hold", {"horizn": 30}, "no parameter 'horizn'. Did you mean 'horizon'"),
         ("hold", {"dataset": "demo"}, "no parameter 'dataset'"),
