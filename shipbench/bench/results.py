@@ -166,7 +166,8 @@ def write_cell(
     with in_one_step(final) as part:
         part.mkdir(parents=True)
         if S is not None:
-            np.savez_compressed(part / "predictions.npz", S=S, **({} if W is None else {"W": W}))
+            arrays: dict[str, Any] = {"S": S} if W is None else {"S": S, "W": W}
+            np.savez_compressed(part / "predictions.npz", **arrays)
         for name, content in files.items():
             (part / name).parent.mkdir(parents=True, exist_ok=True)
             (part / name).write_bytes(content)

@@ -167,7 +167,7 @@ class Physics(FittedShip):
 
     def forces(self) -> tuple[Sequence[Array], list[Active]]:
         """Fitted p0..p10, and the effects of the spec that act as forces."""
-        return self.p, [] if self.extension is None else list(self.extension.active("force"))
+        return list(self.p), [] if self.extension is None else list(self.extension.active("force"))
 
     def accelerations(
         self, flow: Flow, wind: tuple[Array, Array] | None, p: Sequence[Array], active: Sequence[Active]

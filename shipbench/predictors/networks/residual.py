@@ -30,10 +30,8 @@ class _Compiled(torch.autograd.Function):
 
     @staticmethod
     def forward(ctx: Any, state: Tensor, code: Slopes, values: Tensor, act: Tensor, wind: Tensor | None) -> Tensor:
-        given = (state, values, act)
-        rates, slopes = code(
-            *(a.detach().double().numpy() for a in given), None if wind is None else wind.double().numpy()
-        )
+        x, q, given = (a.detach().double().numpy() for a in (state, values, act))
+        rates, slopes = code(x, q, given, None if wind is None else wind.double().numpy())
         ctx.save_for_backward(torch.as_tensor(slopes, dtype=state.dtype))
         return torch.as_tensor(rates, dtype=state.dtype)
 
