@@ -249,7 +249,7 @@ def _one_fold(
     train = [r for i, r in enumerate(dataset.runs) if i not in set(test.tolist())]
     plant = plant_of(dataset.with_runs(train), FOLD_STEPS)
     with limited(Budget(budget.iterations, budget.seconds, budget.gigabytes)) as used:
-        null = plain_model(plant, () if threshold is None else only, settled)
+        null = plain_model(plant, only, settled)
         final, gears = (null, {}) if threshold is None else causes_of(null, threshold, only)
         return replace(fold_errors(dataset, test, null, final, gears), stopped=used.is_spent)
 
