@@ -86,12 +86,13 @@ def _arm(states: np.ndarray) -> None:
     states[:, 1] += 0.3 * np.sin(states[:, 2])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("effect", "fault", "size"),
     [
         ("heading_bias", _turn, np.deg2rad(2.0)),
-        pytest.param("speed_scale", _scale, 0.04, marks=pytest.mark.long),
-        pytest.param("yaw_rate_bias", _bias, np.deg2rad(0.3), marks=pytest.mark.long),
+        ("speed_scale", _scale, 0.04),
+        ("yaw_rate_bias", _bias, np.deg2rad(0.3)),
         ("antenna_offset", _arm, 0.3),
     ],
 )
