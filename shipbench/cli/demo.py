@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from .common import Quiet
+from .common import Quiet, say_wrapped
 
 
 def demo(
@@ -46,8 +46,8 @@ def demo(
     write_diagnosis(found, out / "diagnosis")
     page = write_report(results, out / "report.html", str(ctx.obj), given=[out / "diagnosis"])
     error = results.rows.groupby("model").ed.mean()
-    typer.echo(f"Hidden in the trial: a current of {SPEED} m/s towards {_degrees(TOWARDS)}. Found: {_found(found)}.")
-    typer.echo(
+    say_wrapped(f"Hidden in the trial: a current of {SPEED} m/s towards {_degrees(TOWARDS)}. Found: {_found(found)}.")
+    say_wrapped(
         "Position error after a 60 s prediction, mean over held-out runs: "
         f"{', '.join(f'{m} {error[m]:.1f} m' for m in models)}."
     )
