@@ -16,6 +16,7 @@ from shipbench.data.demo import SPEED, TOWARDS
 
 def test_a_trial_too_short_to_name_its_current_has_all_lines_and_files_too(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("COLUMNS", raising=False)
     monkeypatch.setattr(demo, "RUNS", 3)
     monkeypatch.setattr(demo, "SAMPLES", 61)
     done = CliRunner().invoke(app, ["demo", "-q"])
@@ -32,6 +33,7 @@ def test_a_trial_too_short_to_name_its_current_has_all_lines_and_files_too(tmp_p
 @pytest.mark.long
 def test_demo_finds_the_current_and_says_so_in_five_lines(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("COLUMNS", raising=False)
     done = CliRunner().invoke(app, ["demo", "-q"])
     assert done.exit_code == 0, done.output
     lines = done.stdout.splitlines()

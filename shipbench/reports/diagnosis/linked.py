@@ -38,9 +38,10 @@ def rollouts(trace: Trace, extended: bool) -> list[np.ndarray]:
 
 
 def position_errors(trace: Trace, predicted: np.ndarray) -> np.ndarray:
-    """Mean position error ED of each segment (B,) [m]; NaN where no position is known."""
+    """Mean position error ED of each segment (B,) [m], without the sample that is given; NaN where no position is
+    known."""
     with np.errstate(all="ignore"):
-        error = ed(true=trace.measured, pred=predicted)
+        error = ed(true=trace.measured, pred=predicted)[:, 1:]
     known = np.isfinite(error)
     return np.where(
         known.any(axis=1), np.where(known, error, 0.0).sum(axis=1) / np.maximum(known.sum(axis=1), 1), np.nan

@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 from shipbench.cli.app import app
 from shipbench.diagnosis.result import Calibrated, Candidate, Diagnosis, Estimate, Gain, Moved
 from shipbench.reports.diagnosis.files import write_diagnosis, write_report
-from shipbench.reports.diagnosis.linked import changed, chosen_segments, fits
+from shipbench.reports.diagnosis.linked import changed, chosen_segments, fits, position_errors
 from shipbench.reports.diagnosis.page import diagnosis_page as page
 from shipbench.reports.diagnosis.text import WIDTH, gain_words, headline, summary_lines
 
@@ -211,6 +211,13 @@ def test_runs_are_shown_from_the_greatest_error_to_the_least_and_hold_the_one_th
     assert chosen == sorted(chosen, reverse=True)
     assert {0, 17, 39} <= set(chosen)
     assert chosen_segments(make_trace(4), False) == [0, 1, 2, 3]
+
+
+def test_errors_leave_out_the_given_sample():
+    trace = make_trace()
+    off = trace.measured.copy()
+    off[:, 1:, 0] += 3.0
+    assert position_errors(trace, off) == pytest.approx(3.0)
 
 
 def test_fits_leave_out_the_given_sample_and_what_is_not_measured():

@@ -17,6 +17,7 @@ from shipbench.bench.submissions import read_results
 from shipbench.cli.app import app
 from shipbench.errors import InputError
 from shipbench.leaderboard.histories import near
+from shipbench.leaderboard.pages import build_board
 from shipbench.leaderboard.series import gather
 from shipbench.leaderboard.slicing import regime_errors
 from shipbench.metrics.base import fit_percent
@@ -58,6 +59,13 @@ def test_failed_and_diverged_models_stand_with_their_reasons(study, tmp_path):
     assert "x is inf at t = 6 s" in status
     assert "<dt>Failed, diverged or skipped</dt><dd>6<small>" in text  # three folds each of Fails and Blows
     assert "m.py:Fails" not in text[text.index("Models in the pictures") : text.index('id="d0-tracks"')]
+
+
+def test_the_error_of_the_best_model_is_that_of_the_table(study, tmp_path):
+    text = page_of(study, tmp_path).path.read_text()
+    board = build_board(read_results([study]), read_results([study]).rows["dataset"][0])
+    best = next(row for row in board.tables[0].rows if row["model"] == board.ranking[0])
+    assert f"mean position error ED {best['ed_mean']:.3g} m over" in text
 
 
 def test_any_run_can_be_drawn_with_the_error_of_each_model(study, tmp_path):
