@@ -13,6 +13,7 @@ Distribution-free prediction sets for two-layer hierarchical models, JASA 118 (2
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from typing import Any
 
@@ -61,12 +62,21 @@ def without_parts(train: Dataset, valid: Dataset | None) -> list[tuple[Dataset, 
 
 def band_shape(model: Any, s0: np.ndarray, U: np.ndarray) -> np.ndarray:
     """Half-widths (batch, K, 6) of the motion before they are scaled: of the middle 90 % of the model's own
-    `predict_samples`, or 1 for a model without it."""
+    `predict_samples`, or 1 for a model without it. NaN where no sample is known.
+
+    Raises:
+        ValueError: the samples have another shape.
+    """
     if not callable(getattr(model, "predict_samples", None)):
         return np.ones((*U.shape[:2], 6))
     drawn = np.asarray(model.predict_samples(s0, U, _SAMPLES), dtype=float)
-    low, high = np.nanquantile(drawn, [(1.0 - COVERAGE) / 2.0, (1.0 + COVERAGE) / 2.0], axis=0)
-    return np.asarray(high - low)[..., MOTION] / 2.0
+    batch, K = U.shape[:2]
+    if drawn.ndim != 4 or drawn.shape[1:3] != (batch, K) or drawn.shape[3] < 6:
+        raise ValueError(f"predict_samples: shape {drawn.shape}; accepted: (samples, {batch}, {K}, 6 or 10).")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # of values that no sample knows
+        low, high = np.nanquantile(drawn[..., MOTION], [(1.0 - COVERAGE) / 2.0, (1.0 + COVERAGE) / 2.0], axis=0)
+    return np.asarray(high - low) / 2.0
 
 
 def band_factor(ratios: np.ndarray, groups: Sequence[str]) -> np.ndarray:

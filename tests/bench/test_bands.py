@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -169,3 +171,22 @@ def test_a_model_that_cannot_be_fitted_to_fewer_runs_has_its_scores_and_no_band(
 def test_too_few_runs_say_so(study):
     outcome = study("Holds", max_runs=10)
     assert "fewer than 9 groups" in outcome.summaries[0]["no_band"]
+
+
+class Drawn:
+    """A model whose samples are `drawn`."""
+
+    def __init__(self, drawn: np.ndarray) -> None:
+        self.drawn = drawn
+
+    def predict_samples(self, s0: np.ndarray, U: np.ndarray, samples: int) -> np.ndarray:
+        return self.drawn
+
+
+def test_samples_of_another_shape_are_one_message_and_unknown_ones_no_warning():
+    s0, U = np.zeros((2, 10)), np.zeros((2, 5, 4))
+    with pytest.raises(ValueError, match=r"predict_samples: shape \(2, 10\); accepted: \(samples, 2, 5, 6 or 10\)"):
+        band_shape(Drawn(s0), s0, U)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert np.isnan(band_shape(Drawn(np.full((100, 2, 5, 6), np.nan)), s0, U)).all()
