@@ -225,6 +225,7 @@ def test_resume_runs_again_what_other_data_code_or_task_made(study, change):
     assert len(log(study)) == 6
 
 
+@pytest.mark.long
 def test_without_resume_everything_is_run_again(study):
     study("Spy")
     study("Spy")

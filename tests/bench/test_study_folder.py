@@ -78,6 +78,7 @@ def command(study, *more: str, limit: int) -> subprocess.CompletedProcess[str]:
     )  # fmt: skip
 
 
+@pytest.mark.long
 def test_a_full_disk_stops_with_a_message_keeps_what_is_finished_and_resume_goes_on(study):
     before = study()
     shutil.rmtree(study.cell(1, 1))
@@ -271,6 +272,7 @@ def test_nothing_that_the_study_did_not_make_is_removed(study):
     assert not (study.out / ".rows.parquet.77.tmp").is_symlink()
 
 
+@pytest.mark.long
 def test_another_study_is_replaced_only_where_resume_is_asked_for(study):
     before = study()
     with pytest.raises(

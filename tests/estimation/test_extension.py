@@ -94,6 +94,7 @@ def test_a_gear_is_found_from_command_and_actuator(name, q):
     assert rollout_error(extended, data, channel) < (1.001 if same_law else 0.7) * rollout_error(plain, data, channel)
 
 
+@pytest.mark.long
 def test_a_rudder_offset_in_data_of_the_models_own_structure_is_found_and_takes_the_place_of_p4():
     base = trials(3)
     truth = fitted("physics+rudder_offset[offset=0.05]", base)
@@ -246,6 +247,7 @@ def test_a_river_s_current_on_a_boat_is_within_what_may_be_found():
     np.testing.assert_allclose(values(fitted("physics+current", data)), hidden, rtol=0.15)
 
 
+@pytest.mark.long
 def test_it_runs_beside_the_plain_physics_on_the_command_line(tmp_path, undrawn):
     from shipbench.cli.app import app
 

@@ -98,6 +98,7 @@ def test_a_late_sensor_tells_as_much_of_the_force(fitted, term):
     assert np.all(_by_column(fitted, [term])[NUM_BASE:] == 0.0)
 
 
+@pytest.mark.long
 def test_where_pieces_begin_is_no_evidence_for_a_late_sensor():
     """A slow ship in short runs says little of a delay; the fewer samples of the force in its pieces had been worth 11
     of 2 log evidence for 3 s."""

@@ -57,6 +57,7 @@ def test_a_curve_has_a_figure_for_every_model_and_number_of_runs(cli, tmp_path):
     assert set(pd.read_parquet(tmp_path / "c/train004/rows.parquet")["status"]) == {"ok"}
 
 
+@pytest.mark.long
 def test_a_size_at_which_a_model_fails_is_a_gap_with_its_reason_and_exit_code_one(cli, tmp_path):
     result = cli("-m", "m.py:Learner", *QUICK, "--sizes", "2,4")
     assert result.exit_code == 1

@@ -118,6 +118,7 @@ def test_what_is_right_is_not_called_wrong(found):
     }
 
 
+@pytest.mark.long
 def test_the_lines_heal(folder, found, tmp_path):
     """What the loader refused it loads, and of the quirks only single outliers of the satellite position are left to a
     second look."""

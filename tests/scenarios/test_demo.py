@@ -14,6 +14,7 @@ from shipbench.data import demo
 from shipbench.data.demo import SPEED, TOWARDS
 
 
+@pytest.mark.long
 def test_a_trial_too_short_to_name_its_current_has_all_lines_and_files_too(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.delenv("COLUMNS", raising=False)

@@ -42,8 +42,8 @@ def case(tmp_path_factory) -> Callable[[str], tuple[Outcome, Path]]:
 
 
 def some(names: Sequence[str]) -> list[Any]:
-    """Every fifth fault is for every day, the others are long."""
-    every_day = list(BY_NAME)[::5]
+    """Every tenth fault is for every day, the others are long."""
+    every_day = list(BY_NAME)[::10]
     return [pytest.param(name, marks=[] if name in every_day else pytest.mark.long) for name in names]
 
 

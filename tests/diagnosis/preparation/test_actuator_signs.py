@@ -81,6 +81,7 @@ def test_thrusters_are_not_turned_for_another_rest_of_the_fit(monkeypatch, as_re
     assert bool(turned_actuators(data, null)) is (as_recorded == 0.0)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("size", [-0.6, pytest.param(0.6, marks=pytest.mark.long)])
 def test_weak_or_strong_thrusters_are_not_to_port(size: float):
     assert found(port_trials(4, Hidden(EFFECTS.get("thruster_gain"), (size,)))) == {}

@@ -60,6 +60,7 @@ def kcs() -> Callable[..., Fit]:
     return fitted
 
 
+@pytest.mark.long
 def test_a_pull_on_two_axes_is_judged_on_both_and_not_taken_for_the_hull(kcs):
     def tug(e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
         e.push(0.0, q[0] * ship.mass, 0.3 * ship.L * q[0] * ship.mass)
@@ -73,6 +74,7 @@ def test_a_pull_on_two_axes_is_judged_on_both_and_not_taken_for_the_hull(kcs):
         assert first.score > single + 10.0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", [11, *(pytest.param(seed, marks=pytest.mark.long) for seed in (13, 15))])
 def test_a_force_of_its_own_in_each_run_is_not_taken_for_one_that_follows_place_or_heading(seed):
     """Every run has its own of both: place scored 26 and 58, heading 31 and 47, where 16 are asked. What does follow
@@ -106,6 +108,7 @@ def test_a_force_that_comes_and_goes_from_place_to_place_follows_the_place(kcs):
     assert float(towards) % 180.0 == pytest.approx(np.rad2deg(0.7), abs=10.0)
 
 
+@pytest.mark.long
 def test_a_drag_of_thrusters_that_work_either_way_follows_their_size():
     def drag(e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
         e.push(-q[0] * ship.mass * (np.abs(s.F_b) > 2e4), 0.0, 0.0)

@@ -146,6 +146,7 @@ def test_a_hull_as_polynomial_is_the_same_where_it_was_fitted_and_another_beyond
     assert abs(polynomial(*aside, cubic, *size)[1][0] / unified(*aside, ship.hull, *size)[1][0] - 1.0) > 0.05
 
 
+@pytest.mark.long
 def test_half_of_the_development_ships_have_a_polynomial_hull():
     names = [draw_ship(np.random.default_rng(seed), "development", False).name for seed in range(6)]
     assert 1 <= sum(name.endswith("polynomial") for name in names) <= 5
