@@ -4,13 +4,13 @@ does it on more sets."""
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
+from every_day import every
 
 from shipbench.checking.base import check_dataset, check_path
 from shipbench.data.files import read_dataset
@@ -41,13 +41,7 @@ def case(tmp_path_factory) -> Callable[[str], tuple[Outcome, Path]]:
     return get
 
 
-def some(names: Sequence[str]) -> list[Any]:
-    """Every tenth fault is for every day, the others are long."""
-    every_day = list(BY_NAME)[::10]
-    return [pytest.param(name, marks=[] if name in every_day else pytest.mark.long) for name in names]
-
-
-@pytest.mark.parametrize("name", some(list(BY_NAME)))
+@pytest.mark.parametrize("name", every(10, BY_NAME))
 def test_a_planted_fault_is_found_and_healed(name: str, case):
     outcome, _ = case(name)
     assert outcome.found
@@ -130,7 +124,7 @@ def test_a_rudder_that_answers_the_motion_on_a_straight_course_does_not_seem_to_
 
 
 @pytest.mark.parametrize(
-    "name", some(
+    "name", every(3,
     ["heading in degrees", "heading in degrees, 0 to 360", "rudder in degrees", "yaw rate in deg/min",
         "speeds in knots", "revolutions in rev/s",
      "rudder sign", "west positive", "x east, y north", "ENU, v and r ours", "heading from east",
