@@ -8,6 +8,7 @@ import logging
 import math
 import pickle
 import platform
+import threading
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import CancelledError, Executor, Future, ThreadPoolExecutor
@@ -109,6 +110,11 @@ class Workers(ABC):
     def submit(self, job: Job, folds: Sequence[FoldData]) -> Future[list[Answer]]:
         """Start the job (or put it in the queue)."""
 
+    def stop(self) -> None:
+        """End the running jobs; none begins any more."""
+        self.executor.shutdown(wait=False)
+        stop_all()
+
 
 class _Here(Executor):
     """Executor that runs a job at once, in this thread, so that Ctrl-C reaches it."""
@@ -142,10 +148,15 @@ class _Processes(Workers):
 
     def __init__(self, workers: int, limits: Limits) -> None:
         super().__init__(ThreadPoolExecutor(workers), room=workers)
-        self.limits = limits
+        self.limits, self.stopped = limits, threading.Event()
 
     def submit(self, job: Job, folds: Sequence[FoldData]) -> Future[list[Answer]]:
-        return self.executor.submit(work_isolated, job, folds, self.limits, thread_settings())
+        return self.executor.submit(work_isolated, job, folds, self.limits, thread_settings(), self.stopped)
+
+    def stop(self) -> None:
+        self.stopped.set()
+        self.executor.shutdown(wait=False, cancel_futures=True)
+        super().stop()
 
 
 class _Dask(Workers):
@@ -208,8 +219,7 @@ def open_workers(how: Execution) -> Iterator[Workers]:
         try:
             yield workers
         except BaseException:
-            workers.executor.shutdown(wait=False)
-            stop_all()
+            workers.stop()
             raise
         workers.executor.shutdown()
 

@@ -52,9 +52,15 @@ def thread_settings() -> dict[str, str]:
     return {name: os.environ[name] for name in THREADS if name in os.environ}
 
 
-def work_isolated(job: Job, folds: Sequence[FoldData], limits: Limits, threads: Mapping[str, str]) -> list[Answer]:
+def work_isolated(
+    job: Job,
+    folds: Sequence[FoldData],
+    limits: Limits,
+    threads: Mapping[str, str],
+    stopped: threading.Event | None = None,
+) -> list[Answer]:
     """Run `work` in a process of its own; where it does not answer, each of its cells fails with the reason."""
-    answers, reason = call_isolated(_work_on, (job, *folds), limits, threads, cells=len(folds))
+    answers, reason = call_isolated(_work_on, (job, *folds), limits, threads, cells=len(folds), stopped=stopped)
     return [Answer("failed", f"fit or prediction: {reason}") for _ in folds] if reason else answers
 
 
@@ -71,10 +77,12 @@ def call_isolated(
     limits: Limits | None = None,
     threads: Mapping[str, str] | None = None,
     cells: int = 1,
+    stopped: threading.Event | None = None,
 ) -> tuple[Any, str]:
     """Result of `function(*parts)` in a process of its own, or None and the reason why there is none.
 
     All processes that it started end with it. The parts are sent separately: objects shared by two of them are copied.
+    `stopped` is set before `stop_all`: a process that another thread starts at that moment is ended too.
     """
     limits, threads = limits or Limits(), thread_settings() if threads is None else threads
     alive, held = os.pipe()
@@ -93,6 +101,8 @@ def call_isolated(
             return None, f"no process of its own can be started: {error.strerror}"
         _running.add(process)
         try:
+            if stopped is not None and stopped.is_set():
+                return None, "the study was stopped"
             question = b"".join(pickle.dumps(part) for part in ((function, len(parts)), *parts))
             answer, reason = _attend(process, question, limits, cells)
             return (None, reason) if reason else (pickle.loads(answer), "")

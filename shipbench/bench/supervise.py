@@ -31,9 +31,12 @@ def main(alive: int) -> None:
         alive: reading end of a pipe that the study holds: it ends with the study, also by `kill -9`.
     """
     _prctl(_PR_SET_CHILD_SUBREAPER, 1)
+    supervisor = os.getpid()
     worker = os.fork()
     if worker == 0:
         _prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+        if os.getppid() != supervisor:  # it ended before its end was asked to be told
+            os._exit(1)
         os.close(alive)
         os.setsid()  # a model that signals its own group does not reach this process
         from .answering import answer
