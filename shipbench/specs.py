@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 import os
 import re
@@ -21,6 +22,8 @@ _LONGEST_TOLD = 200
 """Most characters of the values in the label of a model in memory."""
 _TAIL = rf"(?P<tail>(\+[^\[\]+]+({_PARAMS})?)*)"
 _FILE = re.compile(rf"(?P<base>[^\[\]]+\.py:\w+)(?P<params>{_PARAMS})?{_TAIL}")
+_READERS = {"predictions": re.compile(r"predictions:(.+)"), "fmu": re.compile(r"(.+\.fmu)")}
+"""Predictors that are made of a file or folder, and the form of their specs."""
 _NAME = re.compile(rf"(?P<base>[^\[\]+]+)(?P<params>{_PARAMS})?{_TAIL}")
 
 
@@ -36,7 +39,8 @@ class EffectSpec:
 class Spec:
     """Model spec in its parts: `physics+current[..]` -> name "physics", effects (EffectSpec("current", {..}),).
 
-    given: the class or object of a model in memory, which `name` and `text` only label.
+    given: the class, object or function of a model in memory, which `name` and `text` only label.
+    reader: name of the predictor that is made of the file or folder `path`; "" for a saved model and for a class.
     """
 
     text: str
@@ -46,9 +50,15 @@ class Spec:
     path: Path | None = None
     class_name: str | None = None
     given: Any = None
+    reader: str = ""
 
     def __repr__(self) -> str:
         return brief(f"<Spec {self.text}>")
+
+    @property
+    def saved(self) -> bool:
+        """Whether it is the folder of a saved model, which comes fitted."""
+        return self.path is not None and self.class_name is None and not self.reader
 
     @property
     def seeds(self) -> list[int] | None:
@@ -93,18 +103,25 @@ def parse_spec(text: str) -> Spec:
     if match is None:
         raise InputError(
             f"model spec '{text}' cannot be read; accepted: name, name[key=value,...], physics+effect, "
-            "physics+effect[key=value,...], path.py:Class, "
+            "physics+effect[key=value,...], path.py:Class, path.py:simulate, predictions:FOLDER, path.fmu, "
             "a saved folder."
         )
     base, params = match["base"], _params(text, match["params"])
-    added = re.findall(rf"\+([^\[\]+]+)({_PARAMS})?", match["tail"])
-    effects = tuple(EffectSpec(name.strip(), _params(text, bracket or None)) for name, bracket in added)
+    for reader, named in _READERS.items():
+        if (found := named.fullmatch(base.strip())) is not None:
+            return Spec(text, base.strip(), params, _effects(text, match["tail"]), Path(found[1]), reader=reader)
+    effects = _effects(text, match["tail"])
     if match.re is _FILE:
         file, _, class_name = base.rpartition(":")
         return Spec(text, class_name, params, effects, path=Path(file), class_name=class_name)
     if os.path.isfile(os.path.join(base, "model.json")):
         return Spec(text, base, params, effects, path=Path(base))
     return Spec(text, base.strip(), params, effects)
+
+
+def _effects(text: str, tail: str) -> tuple[EffectSpec, ...]:
+    added = re.findall(rf"\+([^\[\]+]+)({_PARAMS})?", tail)
+    return tuple(EffectSpec(name.strip(), _params(text, bracket or None)) for name, bracket in added)
 
 
 def spec_of(model: Any, label: str = "") -> Spec:
@@ -122,13 +139,15 @@ def spec_of(model: Any, label: str = "") -> Spec:
         return model
     if isinstance(model, str | os.PathLike):
         return parse_spec(os.fspath(model))
-    if lacking := [method for method in ("fit", "predict") if not callable(getattr(model, method, None))]:
+    lacking = [method for method in ("fit", "predict") if not callable(getattr(model, method, None))]
+    simulates = callable(getattr(model, "simulate", None)) or (callable(model) and not isinstance(model, type))
+    if lacking and ("fit" not in lacking or not simulates):
         raise InputError(
             f"the model {_class_name(model)} has no method {' and no '.join(lacking)}. Accepted: a spec such as "
-            "'physics', or a class or object with "
-            "fit(train, valid=None, *, seed=0) and predict(s0, U, history=None)."
+            "'physics', a class or object with "
+            "fit(train, valid=None, *, seed=0) and predict(s0, U, history=None), or a function simulate(s0, U, dt)."
         )
-    text = label or _label(model)
+    text = label or (model.__name__ if inspect.isroutine(model) else _label(model))
     return Spec(text, text, {}, given=model)
 
 

@@ -15,6 +15,9 @@ from ..specs import Spec
 from .isolate import call_isolated
 from .provenance import source_digest
 
+_FOREIGN_CODE = frozenset({"fmu"})
+"""Readers of files that hold code of others."""
+
 
 @dataclass(frozen=True)
 class ModelFacts:
@@ -50,7 +53,7 @@ def facts_of(spec: Spec) -> ModelFacts:
     kind = _kind(spec)
     taken = [(EFFECTS, effect.name) for effect in spec.effects] + ([(PREDICTORS, kind)] if kind in PREDICTORS else [])
     packages = sorted({package for registry, name in taken if (package := registry.package(name))})
-    foreign = bool(packages) or spec.class_name is not None
+    foreign = bool(packages) or spec.class_name is not None or spec.reader in _FOREIGN_CODE
     if foreign:
         made, unanswered = call_isolated(_made_alone, (spec,))
         if unanswered:
@@ -69,6 +72,8 @@ def _kind(spec: Spec) -> str:
     """Name of the registered predictor behind a spec, "" for a model file and for a model in memory."""
     if spec.class_name is not None or spec.given is not None:
         return ""
+    if spec.reader:
+        return spec.reader
     if spec.path is None:
         return spec.name.partition(":")[0]
     return str(read_meta(spec.path)["predictor"])
@@ -103,6 +108,8 @@ def _files(spec: Spec) -> dict[str, bytes]:
         return {}
     if spec.class_name is not None:
         return code_of(spec.path)
+    if spec.path.is_file():
+        return {spec.path.name: spec.path.read_bytes()}
     return {
         p.relative_to(spec.path.parent).as_posix(): p.read_bytes() for p in sorted(spec.path.rglob("*")) if p.is_file()
     }

@@ -10,6 +10,7 @@ import numpy as np
 from ..errors import InputError
 from ..predictors._saved import check_origin
 from ..predictors.base import make_predictor
+from ..predictors.context import Context, predicted
 from ..records import Dataset
 from ..render.escaping import csv_text
 from ..signals import STATES
@@ -32,7 +33,7 @@ def predict_runs(
             shorter than the horizon, or the device is not here.
     """
     spec = parse_spec(model)
-    if spec.path is None or spec.class_name is not None:
+    if not spec.saved:
         raise InputError(
             f"'{model}' is not a saved model; give a folder that holds model.json "
             "(cells/<dataset>/<model>/fold0-seed0/model)."
@@ -43,7 +44,8 @@ def predict_runs(
         raise InputError(f"--horizon {horizon_s:g}; accepted: a positive number of seconds.")
     asked = None if horizon_s is None else samples(horizon_s, dataset.dt, "--horizon")
     rollouts = []
-    for run in dataset.runs:
+    whole = Context.of(dataset)
+    for place, run in enumerate(dataset.runs):
         steps = asked or len(run) - 1
         if not 0 < steps < len(run):
             raise InputError(
@@ -51,7 +53,7 @@ def predict_runs(
                 "give a positive --horizon "
                 "that no run falls short of."
             )
-        S = predictor.predict(run.states[0], run.inputs[:steps])
+        S = predicted(predictor, run.states[0], run.inputs[:steps], None, whole.rows([place]))
         rollouts.append((run.id, run.t[: steps + 1], np.concatenate([run.states[:1], S])))
     return rollouts
 

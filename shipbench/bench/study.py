@@ -11,6 +11,7 @@ import numpy as np
 
 from ..errors import WorkError
 from ..metrics.base import METRICS
+from ..predictors.context import Context
 from ..records import Batch, Dataset, Run
 from ..specs import Spec
 from .folds import Fold
@@ -44,6 +45,7 @@ class Study:
                 b.s0,
                 b.U,
                 b.history,
+                Context.of(f.test, self.task.history(self.data.dt)),
             )
             for f, b in zip(self.folds, self.batches, strict=True)
         ]

@@ -25,6 +25,7 @@ from ..errors import ShipbenchError
 from ..metrics.base import state_error
 from ..predictors._user_file import code_of, files_read, on_import_path
 from ..predictors.base import History, make_predictor
+from ..predictors.context import Context, predicted
 from ..predictors.physics_model.fit_report import FitReport
 from ..records import Dataset
 from ..signals import MOTION
@@ -40,14 +41,15 @@ CancelledError and an exit."""
 
 @dataclass(frozen=True, eq=False)
 class FoldData:
-    """Data of a fold that a model may see: windows for fitting and for early stopping, and start, inputs and history of
-    the scored windows."""
+    """Data of a fold that a model may see: windows for fitting and for early stopping, and start, inputs, history and
+    context of the scored windows."""
 
     train: Dataset
     valid: Dataset | None
     s0: np.ndarray
     U: np.ndarray
     history: History | None
+    context: Context | None = None
 
 
 @dataclass(frozen=True)
@@ -204,7 +206,7 @@ def _fit(job: Job, folds: Sequence[FoldData]) -> list[_Fit]:
     others."""
     spec, seed = job.spec, job.seed
     models = [make_predictor(spec, job.device) for _ in folds]
-    if spec.path is not None and spec.class_name is None:
+    if spec.saved:
         return [_Fit(model, 0.0) for model in models]  # a saved model comes fitted
     group, began = getattr(type(models[0]), "fit_group", None), time.perf_counter()
     if group is not None and len(folds) > 1:
@@ -262,13 +264,13 @@ def _with_band(answer: Answer, job: Job, model: Any, fold: FoldData) -> Answer:
 
 def _band(job: Job, model: Any, fold: FoldData) -> tuple[np.ndarray | None, str]:
     """Half-widths (batch, K, 6) of the band of a fitted model, or None and the reason."""
-    if job.spec.path is not None and job.spec.class_name is None:
+    if job.spec.saved:
         return None, "a saved model is not fitted again, so that its errors on left-out runs are not known"
     history = 0 if fold.history is None else fold.history[0].shape[1]
     folds, truths, groups = [], [], list[str]()
     for train, valid, out in without_parts(fold.train, fold.valid):
         batch = out.batch(history)
-        folds.append(FoldData(train, valid, batch.s0, batch.U, batch.history))
+        folds.append(FoldData(train, valid, batch.s0, batch.U, batch.history, Context.of(out, history)))
         truths.append(batch.truth)
         groups += [run.group for run in out.runs]
     if not folds:
@@ -291,7 +293,7 @@ def _predict(model: Any, fold: FoldData) -> np.ndarray:
     """Predict on copies of the data that the model may see: writing into them, or reading beyond their views, never
     reaches the truth."""
     history = None if fold.history is None else (fold.history[0].copy(), fold.history[1].copy())
-    S = np.array(model.predict(fold.s0.copy(), fold.U.copy(), history), dtype=float)
+    S = np.array(predicted(model, fold.s0.copy(), fold.U.copy(), history, fold.context), dtype=float)
     expected = (*fold.U.shape[:2], fold.s0.shape[1])
     if S.shape != expected:
         raise ValueError(f"the prediction has shape {S.shape}; accepted: {expected} (batch, K, 10), without s0")

@@ -75,11 +75,9 @@ def check_model(model: Any, data: Dataset | None = None, device: str | None = No
                 f"model '{text}' has no method {method}; a predictor has fit(train, valid=None, *, seed) and "
                 "predict(s0, U, history=None)."
             )
-    inputs = (
-        tuple(getattr(model, "inputs", COMMANDS)) if spec.path is not None and spec.class_name is None else COMMANDS
-    )
+    inputs = tuple(getattr(model, "inputs", COMMANDS)) if spec.saved else COMMANDS
     used = small_harbour(inputs=inputs) if data is None else few_windows(data)
-    if inputs != used.inputs and spec.class_name is None and spec.path is not None:
+    if inputs != used.inputs and spec.saved:
         raise InputError(
             f"the saved model uses the inputs {', '.join(inputs)}; data set '{used.name}' has "
             f"{', '.join(used.inputs)}. Give its own data."

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..predictors.base import make_predictor
+from ..predictors.context import Context, predicted
 from ..signals import PSI, STATES, move_frame, wrap_angle
 from .base import Rule
 from .saving import same_after_loading
@@ -26,6 +27,12 @@ def _unfitted(c: Subject) -> None:
     """Raise `NotApplicable` for a rule of `fit` on a saved model."""
     if c.saved:
         raise NotApplicable("a saved model comes fitted")
+
+
+def _from_start(c: Subject) -> None:
+    """Raise `NotApplicable` for a rule on other starts where the states are read from a file."""
+    if c.replay:
+        raise NotApplicable(c.replay)
 
 
 def fit(c: Subject) -> str:
@@ -118,7 +125,7 @@ def shape(c: Subject) -> str:
     batch, K = c.batch, c.batch.U.shape[1]
     shapes = []
     for runs, steps in ((len(batch.s0), K), (1, K), (len(batch.s0), K // 3), (len(batch.s0), 1)):
-        S = attempt(lambda n=runs, k=steps: c.ask(batch.s0[:n], batch.U[:n, :k]))  # type: ignore[misc]
+        S = attempt(lambda n=runs, k=steps: c.ask(batch.s0[:n], batch.U[:n, :k], rows=slice(n)))  # type: ignore[misc]
         if isinstance(S, Exception):
             raise Broken(f"for {runs} runs and {steps} steps it {raised(S)}")
         if S.shape != (runs, steps, len(STATES)):
@@ -142,7 +149,7 @@ def shape(c: Subject) -> str:
 def dtype(c: Subject) -> str:
     """`predict` gives a numpy array of floats, and takes float32 as well."""
     batch = c.batch
-    S = c.model.predict(batch.s0.copy(), batch.U.copy(), None)
+    S = predicted(c.model, batch.s0.copy(), batch.U.copy(), None, Context.of(c.parts[2]))
     if not isinstance(S, np.ndarray) or not np.issubdtype(S.dtype, np.floating):
         kind = f"an array of {S.dtype}" if isinstance(S, np.ndarray) else f"a {type(S).__module__}.{type(S).__name__}"
         raise Broken(f"predict returned {kind}; accepted: a numpy array of float64 or float32")
@@ -168,7 +175,7 @@ def repeatable(c: Subject) -> str:
     same."""
     batch = c.batch
     first = c.S
-    c.ask(batch.s0[::-1] * 1.1, batch.U[::-1])
+    c.ask(batch.s0[::-1] * 1.1, batch.U[::-1], rows=slice(None, None, -1))
     return c.same(c.ask(batch.s0, batch.U), first, 0.0, "asked again after another question")
 
 
@@ -183,7 +190,7 @@ def predict_inputs(c: Subject) -> str:
         "the history's inputs": past[1],
     }
     before = {name: array.copy() for name, array in given.items()}
-    c.model.predict(given["s0"], given["U"], past)
+    predicted(c.model, given["s0"], given["U"], past, Context.of(c.parts[2], HISTORY))
     for name, array in given.items():
         if not np.array_equal(array, before[name]):
             raise Broken(f"predict wrote into {name} ({int((array != before[name]).sum())} values); work on a copy")
@@ -192,20 +199,21 @@ def predict_inputs(c: Subject) -> str:
 
 def single_run(c: Subject) -> str:
     """A single run without the batch axis, s0 (10,) and U (K, inputs), gives (K, 10)."""
-    alone = attempt(lambda: c.ask(c.batch.s0[0], c.batch.U[0]))
+    alone = attempt(lambda: c.ask(c.batch.s0[0], c.batch.U[0], rows=slice(1)))
     if isinstance(alone, Exception):
         raise Broken(f"for s0 (10,) and U {c.batch.U[0].shape} it {raised(alone)}")
-    return c.same(
-        alone, c.ask(c.batch.s0[:1], c.batch.U[:1])[0], ROUNDING, "difference to the same run as a batch of one"
-    )
+    together = c.ask(c.batch.s0[:1], c.batch.U[:1], rows=slice(1))[0]
+    return c.same(alone, together, ROUNDING, "difference to the same run as a batch of one")
 
 
 def batch_independence(c: Subject) -> str:
     """The prediction for a run depends neither on the runs beside it nor on their order."""
     batch = c.batch
-    loop = np.concatenate([c.ask(batch.s0[i : i + 1], batch.U[i : i + 1]) for i in range(len(batch.s0))])
+    each, back = [slice(i, i + 1) for i in range(len(batch.s0))], slice(None, None, -1)
+    loop = np.concatenate([c.ask(batch.s0[one], batch.U[one], rows=one) for one in each])
+    reverse = c.ask(batch.s0[back], batch.U[back], rows=back)[back]
     said = c.same(loop, c.S, ROUNDING, "run by run")
-    return f"{said}; {c.same(c.ask(batch.s0[::-1], batch.U[::-1])[::-1], c.S, ROUNDING, 'in reverse order')}"
+    return f"{said}; {c.same(reverse, c.S, ROUNDING, 'in reverse order')}"
 
 
 def causality(c: Subject) -> str:
@@ -224,12 +232,14 @@ def causality(c: Subject) -> str:
 def heading(c: Subject) -> str:
     """The heading is not wrapped: started one turn further (psi + 2 pi), it stays one turn further and nothing else
     changes."""
+    _from_start(c)
     turn = np.eye(len(STATES))[PSI] * 2.0 * np.pi
     return c.same(c.ask(c.batch.s0 + turn, c.batch.U), c.S + turn, ROUNDING, "psi + 2 pi")
 
 
 def translation(c: Subject) -> str:
     """A shifted origin shifts the prediction and changes nothing else."""
+    _from_start(c)
     if c.earth_fixed:
         raise NotApplicable(c.earth_fixed)
     origin = np.array([500.0, -300.0])
@@ -239,6 +249,7 @@ def translation(c: Subject) -> str:
 
 def rotation(c: Subject) -> str:
     """A ship started on another course from the same place sails the same track, turned."""
+    _from_start(c)
     if "wind_from" in c.data.inputs:
         raise NotApplicable("the data have an earth-fixed input (wind_from)")
     if c.earth_fixed:
@@ -285,6 +296,7 @@ def diverging(c: Subject) -> str:
 def not_finite(c: Subject) -> str:
     """NaN or inf in the arguments is refused with a ValueError or InputError, or stays in its own run and shows
     there."""
+    _from_start(c)
     batch, k = c.batch, c.batch.U.shape[1] // 2
     said = []
     for what, value in (("s0 NaN", np.nan), ("s0 inf", np.inf), (f"U NaN at step {k + 1}", np.nan)):

@@ -15,6 +15,7 @@ import numpy as np
 
 from ..effects.base import EFFECTS
 from ..predictors.base import make_predictor
+from ..predictors.context import Context, predicted
 from ..records import Batch, Dataset
 from ..registry import reason
 from ..signals import PSI, STATES
@@ -55,7 +56,7 @@ class Subject:
     saved: bool = field(init=False)
 
     def __post_init__(self) -> None:
-        self.saved = self.spec.path is not None and self.spec.class_name is None
+        self.saved = self.spec.saved
 
     @cached_property
     def parts(self) -> tuple[Dataset, Dataset, Dataset]:
@@ -105,10 +106,22 @@ class Subject:
         """Prediction of `batch`, in float64."""
         return self.ask(self.batch.s0, self.batch.U)
 
-    def ask(self, s0: np.ndarray, U: np.ndarray, history: Any = None, model: Any = None) -> np.ndarray:
-        """Predict on copies of the arguments, in float64, shape unchecked."""
+    def ask(
+        self, s0: np.ndarray, U: np.ndarray, history: Any = None, model: Any = None, rows: slice = slice(None)
+    ) -> np.ndarray:
+        """Predict on copies of the arguments, in float64, shape unchecked; `rows` are those of `batch`, for the context
+        that a model asks for."""
         copies = None if history is None else (history[0].copy(), history[1].copy())
-        return np.array((model or self.model).predict(s0.copy(), U.copy(), copies), dtype=float)
+        whole = Context.of(self.parts[2], 0 if history is None else history[0].shape[-2])
+        context = whole.rows(range(len(whole))[rows])
+        return np.array(predicted(model or self.model, s0.copy(), U.copy(), copies, context), dtype=float)
+
+    @property
+    def replay(self) -> str:
+        """Reason why other starts and inputs change nothing in this model's states, or ""."""
+        return (
+            "the states are read from a file, and follow from no start" if getattr(self.model, "replay", False) else ""
+        )
 
     @cached_property
     def scale(self) -> np.ndarray:

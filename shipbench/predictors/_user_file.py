@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from functools import cache
 from itertools import islice
 from pathlib import Path
-from types import ModuleType
+from types import FunctionType, ModuleType
 from typing import Any
 
 from ..errors import InputError, unknown_name
@@ -29,7 +29,7 @@ _brought: set[str] = set()
 
 
 def class_from_file(path: Path, class_name: str) -> Any:
-    """Class `class_name` of the Python file `path`.
+    """Class or function `class_name` of the Python file `path`.
 
     Raises:
         InputError: there is no such file or class, or it needs an extra of shipbench that is not installed.
@@ -53,9 +53,13 @@ def class_from_file(path: Path, class_name: str) -> Any:
             _brought.update(n for n in set(sys.modules) - before - {name} if _own_file(sys.modules[n]))
     if not hasattr(module, class_name):
         raise unknown_name(
-            f"class in {path}",
+            f"class or function in {path}",
             class_name,
-            [k for k, v in vars(module).items() if isinstance(v, type) and v.__module__ == name],
+            [
+                k
+                for k, v in vars(module).items()
+                if isinstance(v, type | FunctionType) and v.__module__ == name and not k.startswith("_")
+            ],
         )
     return getattr(module, class_name)
 

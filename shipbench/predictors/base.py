@@ -32,6 +32,7 @@ from ._saved import (
 )
 from ._user_file import class_from_file, spec_in_file
 from .device import check_device
+from .own_simulator import simulator_of
 from .registered import PREDICTORS
 
 History = tuple[np.ndarray, np.ndarray]
@@ -52,6 +53,8 @@ class Predictor(Protocol):
             band takes its shape from them.
         num_parameters: count of fitted numbers.
         seeded: False where nothing is drawn at random.
+        context: an argument of `predict` of that name is given the `Context` of the runs.
+        replay: True where the states do not follow from s0 and U, since they are read from a file.
         earth_fixed: True where the model knows a place on earth.
         device: set by `--device` ("cpu", "cuda", "cuda:1") before it fits or predicts.
     """
@@ -259,6 +262,8 @@ def make_predictor(model: Any, device: str | None = None) -> Any:
 def _given(spec: Spec) -> Any:
     """New object of a class in memory, or a copy of an object."""
     try:
+        if (simulator := simulator_of(spec.given)) is not None:
+            return simulator
         return spec.given() if isinstance(spec.given, type) else copy.deepcopy(spec.given)
     except (TypeError, ValueError) as error:
         made, instead = (
@@ -267,13 +272,22 @@ def _given(spec: Spec) -> Any:
         raise InputError(f"model '{spec.text}' cannot be {made}: {error}. Give {instead}.") from error
 
 
+def _of_file(spec: Spec) -> Any:
+    """Model of a file or folder that a registered predictor reads."""
+    if spec.effects:
+        raise _no_effects(spec)
+    return PREDICTORS.get(spec.reader).of_file(spec.path, {k: v for k, v in spec.params.items() if k != "seed"})
+
+
 def _made(spec: Spec) -> Any:
     if spec.given is not None:
         return _given(spec)
-    if spec.path is not None and spec.class_name is None:
+    if spec.saved:
         if spec.effects:
             raise _no_effects(spec)
-        return PREDICTORS.get(read_meta(spec.path)["predictor"]).load(spec.path)
+        return PREDICTORS.get(read_meta(Path(str(spec.path)))["predictor"]).load(spec.path)
+    if spec.reader:
+        return _of_file(spec)
     family, _, member = (spec.name, "", "") if spec.path is not None else spec.name.partition(":")
     if spec.path is None and family not in PREDICTORS and (meant := spec_in_file(family)):
         half = "a file without its class" if family.endswith(".py") else "a class without its file"
@@ -293,6 +307,8 @@ def _made(spec: Spec) -> Any:
             if key not in {f.name for f in fields(cls)}:
                 raise unknown_parameter(f"'{spec.name}'", key, [f.name for f in fields(cls)] + ["seed"])
     try:
+        if spec.path is not None and (simulator := simulator_of(cls, params)) is not None:
+            return simulator
         model = cls(**params)
         return model.extend(spec.effects) if spec.effects else model
     except (TypeError, ValueError) as error:

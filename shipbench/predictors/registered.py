@@ -5,5 +5,9 @@ from __future__ import annotations
 from ..registry import Registry
 
 PREDICTORS = Registry(
-    "predictor", "predictors", "PREDICTOR", helpers=frozenset({"base", "device", "registered", "training"}), lazy=True
+    "predictor",
+    "predictors",
+    "PREDICTOR",
+    lazy=True,
+    helpers=frozenset({"base", "context", "device", "own_simulator", "registered", "training"}),
 )

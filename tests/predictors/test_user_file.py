@@ -48,5 +48,5 @@ def test_the_code_of_a_model_is_its_file_and_what_it_imports_of_the_users_own(tm
 
 
 def test_an_unknown_class_is_told_with_those_that_are_there(tmp_path):
-    with pytest.raises(InputError, match=r"unknown class in .*model.py 'Modl'. Did you mean 'Model'"):
+    with pytest.raises(InputError, match=r"unknown class or function in .*model.py 'Modl'. Did you mean 'Model'"):
         class_from_file(_model(tmp_path / "a", 1.0), "Modl")

@@ -1,0 +1,116 @@
+"""A user's `simulate(s0, U, dt)` as a model: batches and single runs, settings, context, wrong functions."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from shipbench.api import benchmark
+from shipbench.contract.check import check_model
+from shipbench.errors import InputError
+from shipbench.predictors.base import make_predictor
+from shipbench.predictors.context import Context
+from shipbench.predictors.own_simulator import Simulator
+
+FILE = '''
+import numpy as np
+
+def whole(s0, U, dt, speed=1.0):
+    """Straight on."""
+    assert s0.ndim == 2
+    t = dt * np.arange(1, U.shape[1] + 1)
+    S = np.repeat(s0[:, None], len(t), axis=1)
+    psi, u, v = s0[:, 2, None], speed * s0[:, 3, None], speed * s0[:, 4, None]
+    S[..., 0] += t * (u * np.cos(psi) - v * np.sin(psi))
+    S[..., 1] += t * (u * np.sin(psi) + v * np.cos(psi))
+    return S
+
+def one(s0, U, dt):
+    x, y, psi, u, v = s0[:5]  # no batch
+    return whole(s0[None], U[None], dt)[0]
+
+def asks(s0, U, dt, *, context):
+    assert len(context) == len(s0) and context.ship.L == 130.0 and context.dt == dt
+    return whole(s0, U, dt)
+
+class Mine:
+    def __init__(self, speed=1.0):
+        self.speed = speed
+    def simulate(self, s0, U, dt):
+        return whole(s0, U, dt, self.speed)
+
+def two(a, b):
+    return a
+
+def short(s0, U, dt):
+    return whole(s0, U, dt)[:, 1:]
+'''
+
+
+@pytest.fixture
+def file(tmp_path):
+    path = tmp_path / "sim.py"
+    path.write_text(FILE)
+    return path
+
+
+def predicted(spec: str, harbour) -> np.ndarray:
+    batch = harbour.batch()
+    model = make_predictor(spec).fit(harbour)
+    return np.asarray(model.predict(batch.s0, batch.U, context=Context.of(harbour)))
+
+
+@pytest.mark.parametrize("name", ["one", "asks", "Mine", "Mine[speed=1.0]", "whole[speed=1.0]"])
+def test_every_form_gives_the_same(file, harbour, name):
+    np.testing.assert_array_equal(predicted(f"{file}:{name}", harbour), predicted(f"{file}:whole", harbour))
+
+
+def test_a_setting_reaches_the_function(file, harbour):
+    assert not np.allclose(predicted(f"{file}:whole[speed=2.0]", harbour), predicted(f"{file}:whole", harbour))
+
+
+@pytest.mark.parametrize("name", ["whole", "one", "asks", "Mine"])
+def test_no_rule_of_the_contract_is_broken(file, name):
+    assert not check_model(f"{file}:{name}").of("broken")
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [("two", "cannot be called as simulate"), ("whole[pace=2]", "pace"), ("nothing", "Known: Mine, asks, one")],
+)
+def test_a_function_that_cannot_be_called_is_refused_with_its_arguments(file, name, said):
+    with pytest.raises(InputError, match=said):
+        make_predictor(f"{file}:{name}")
+
+
+def test_another_shape_is_told_with_what_is_accepted(file, harbour):
+    batch = harbour.batch()
+    with pytest.raises(ValueError, match=r"returned the shape .*; accepted"):
+        make_predictor(f"{file}:short").fit(harbour).predict(batch.s0, batch.U)
+
+
+def test_the_context_is_missed_with_a_message(file, harbour):
+    batch = harbour.batch()
+    with pytest.raises(InputError, match="asks for the context"):
+        make_predictor(f"{file}:asks").fit(harbour).predict(batch.s0, batch.U)
+
+
+def test_a_function_in_memory_is_scored_under_its_name(harbour):
+    def still(s0, U, dt):
+        return np.repeat(s0[:, None], U.shape[1], axis=1)
+
+    scores = benchmark([still, "hold"], harbour, horizon=20, folds=2, quiet=True)
+    assert set(scores.table()["model"]) == {"still", "hold"}
+
+
+def test_the_context_holds_run_and_time_of_each_window(harbour):
+    windows = harbour.windows(10, history=3)
+    context = Context.of(windows, history=3)
+    assert context.runs[:2] == (harbour.runs[0].id,) * 2
+    np.testing.assert_allclose(context.start[:3], [3.0, 13.0, 23.0])
+    assert context.rows([2, 0]).start.tolist() == [23.0, 3.0]
+    assert repr(Simulator(len_of)) == "<Simulator len_of>"
+
+
+def len_of(s0, U, dt):
+    return U
