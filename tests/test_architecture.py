@@ -25,6 +25,7 @@ HOUSE: dict[float, dict[str, str]] = {
     0.5: {
         "names": "names from outside", "thresholds": "numbers that decide, with their evidence",
          "extras": "optional packages", "kept_code": "what of a cache is trusted",
+        "units": "units and signs of files",
     },
     0.6: {"toml_files": "reading TOML"},
     1: {

@@ -34,7 +34,6 @@ ELSEWHERE = {
     "data/noise": "data/test_coverage.py",
     "data/reread": "diagnosis/preparation/test_record_errors.py",
     "data/sensitivity": "data/test_coverage.py",
-    "data/units": "data/test_files_pitfalls.py",
     "diagnosis/diagnose": "diagnosis/actuators/test_identify.py",
     "diagnosis/preparation/base": "diagnosis/preparation/test_apparent_wind.py",
     "diagnosis/preparation/log_dropout": "checking/test_speed_log.py",

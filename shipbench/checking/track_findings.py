@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..data.units import LENGTHS
+from ..units import LENGTHS
 from .finding import Curve, Finding, Picture, Severity, toml_line
 from .recording import Recording
 from .selection import Chosen

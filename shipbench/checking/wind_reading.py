@@ -15,10 +15,10 @@ from typing import Any
 
 import numpy as np
 
-from ..data.units import unit_factor
 from ..physics.wind import KINDS, true_wind
 from ..records import Dataset, Run
 from ..signals import PSI, U, V
+from ..units import unit_factor
 from .finding import Curve, Finding, Picture, toml_line
 from .recording import Recording
 from .statistics import clustered_fit, clusters

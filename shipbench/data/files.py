@@ -32,9 +32,9 @@ from ..ship import Ship
 from ..signals import COMMANDS, STATES, wrap_angle
 from ..storage import in_one_step, write_text
 from ..toml_files import Number, fault, read_toml
+from ..units import sign_factor, unit_factor
 from .corrections import Corrections, check_names, continuous, correct_run, split_meta, to_ned
 from .trajectories import read_trajectories
-from .units import sign_factor, unit_factor
 
 TABLES = ("trajectories.parquet", "trajectories.csv.gz", "trajectories.csv")
 BEFORE_CHECK = "dataset.toml.before-check"

@@ -8,9 +8,9 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from ..data.units import sign_factor, unit_factor
 from ..errors import InputError, unknown_name
 from ..signals import COMMANDS, ENVIRONMENT, STATES, UNITS
+from ..units import sign_factor, unit_factor
 from .thresholds import THRESHOLDS
 
 EXTRA_UNITS = {

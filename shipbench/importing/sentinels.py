@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..data.units import unit_factor
+from ..units import unit_factor
 from .entries import ANGLES, LIMITS
 from .thresholds import THRESHOLDS
 

@@ -15,11 +15,11 @@ import pytest
 from toy_ship import TOY_SHIP, sail
 
 from shipbench.data.files import read_dataset, write_dataset
-from shipbench.data.units import unit_factor
 from shipbench.errors import InputError
 from shipbench.records import Dataset, Run
 from shipbench.run_meta import RunMeta
 from shipbench.signals import COMMANDS
+from shipbench.units import unit_factor
 
 Edit = Callable[[pd.DataFrame], pd.DataFrame]
 

@@ -18,13 +18,13 @@ from ...checking.finding import Finding
 from ...checking.units import UnitFinding
 from ...checking.units import merged as one_per_channel
 from ...data.reread import reread
-from ...data.units import sign_factor, unit_factor
 from ...effects.base import EFFECTS
 from ...errors import InputError
 from ...estimation.forward import SEGMENT
 from ...records import Run
 from ...ship import Particulars, complete
 from ...signals import COMMANDS, PSI, STATES, X, Y
+from ...units import sign_factor, unit_factor
 from ..thresholds import THRESHOLDS
 from .base import Prepared
 from .derived_speeds import beside_heading, beside_track

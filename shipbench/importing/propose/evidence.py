@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from ...data.units import unit_factor
 from ...errors import InputError
+from ...units import unit_factor
 from ..cells import Counts
 from ..channels import read_blocks
 from ..clock import RELATIVE

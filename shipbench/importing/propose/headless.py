@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...data.units import unit_factor
+from ...units import unit_factor
 from ..thresholds import THRESHOLDS
 from .assign import Assigned, Entry
 from .columns import Column

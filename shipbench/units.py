@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 import re
 
-from ..errors import unknown_name
-from ..signals import UNITS
+from .errors import unknown_name
+from .signals import UNITS
 
 LENGTHS = {"m": 1.0, "km": 1000.0, "ft": 0.3048, "nmi": 1852.0}
 _ANGLE = {"rad": 1.0, "deg": math.pi / 180.0, "cdeg": math.pi / 18_000.0}
