@@ -7,7 +7,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .api import benchmark, check_data, diagnose, import_log, propose_mapping, report
+    from .api import benchmark, check_data, diagnose, export_model, import_log, propose_mapping, report
     from .bench.runner import run_tasks
     from .bench.submissions import read_results
     from .bench.task import Task, load_tasks
@@ -26,8 +26,8 @@ if TYPE_CHECKING:
     __version__: str
 
 _HOME = {
-    "benchmark": "api", "check_data": "api", "diagnose": "api", "import_log": "api", "propose_mapping": "api",
-    "report": "api", "Scores": "scores",
+    "benchmark": "api", "check_data": "api", "diagnose": "api", "export_model": "api", "import_log": "api",
+    "propose_mapping": "api", "report": "api", "Scores": "scores",
     "build_board": "leaderboard.pages", "write_boards": "leaderboard.pages", "read_results": "bench.submissions",
     "run_tasks": "bench.runner", "Task": "bench.task", "load_tasks": "bench.task", "check_model": "contract.check",
     "DATASETS": "data.base", "load_dataset": "data.base",
@@ -41,7 +41,7 @@ __all__ = [
     "DATASETS", "METRICS", "PREDICTORS", "Batch", "Dataset", "InputError", "Predictor", "PredictorBase", "Run",
     "RunMeta", "Scores", "Ship",
     "ShipbenchError", "Task", "WorkError", "__version__", "benchmark", "build_board", "check_data", "check_model",
-    "diagnose", "import_log",
+    "diagnose", "export_model", "import_log",
     "load_dataset", "load_tasks", "make_predictor", "parse_spec", "propose_mapping", "read_results", "report",
     "run_tasks", "write_boards",
 ]  # fmt: skip

@@ -320,3 +320,23 @@ def report(
     else:
         scores = Scores(read_results([Path(folder) for folder in _several(results)]))
     return scores.report(out, diagnosis=[Path(folder) for folder in _several(diagnosis)])
+
+
+def export_model(path: Place, format: str, out: Place | None = None, *, fmi: int = 2, force: bool = False) -> Path:
+    """Write a saved model for other programs, as `shipbench export` does, and return the path.
+
+    Args:
+        path: folder of a saved `physics` or `calibrated`, with or without effects.
+        format: "fmu", "c", "casadi", "matlab" or "json".
+        out: file to write, or folder of "c"; None: named after ship and model, in the current folder.
+        fmi: version of FMI of an FMU, 2 or 3.
+        force: replace what is there.
+
+    Raises:
+        InputError: the folder is no saved model or one that cannot be exported, the format is unknown, `out` is there
+            already or no name for this format, or an FMU is asked for and there is no C compiler.
+        WorkError: the model diverges, or the compiler fails.
+    """
+    from .exporting.formats import export
+
+    return export(os.fspath(path), format, None if out is None else Path(out), fmi=fmi, force=force)

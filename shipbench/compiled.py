@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import ctypes
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
@@ -216,19 +216,24 @@ def c_source(function: casadi.Function) -> str | None:
     return f"{_HEAD}{head}static void step(const v *g, v *y) {{\n{body}\n}}\n{_LANES}"
 
 
-def _instructions(function: casadi.Function, places: Sequence[str]) -> str | None:
-    """Instructions of the function in C, its inputs taken from `places`."""
+def operations(function: casadi.Function) -> Iterator[tuple[str, list[int], list[int], float]]:
+    """Instructions of a function in SX, in order: operation ("ADD"), its operands, its result, and the value of a
+    constant. Operands and result are work variables; an INPUT has (argument, element) as operands, an OUTPUT as its
+    result."""
     import casadi
 
     names = {number: name[3:] for name, number in vars(casadi).items() if name.startswith("OP_")}
-    lines = [f"v {', '.join(f'a{i}' for i in range(function.sz_w()))};"]
     for k in range(function.n_instructions()):
-        name, given, out = (
-            names[function.instruction_id(k)],
-            function.instruction_input(k),
-            function.instruction_output(k),
-        )
-        if name == "CONST" and math.isfinite(value := function.instruction_constant(k)):
+        name = names[function.instruction_id(k)]
+        value = function.instruction_constant(k) if name == "CONST" else math.nan
+        yield name, function.instruction_input(k), function.instruction_output(k), value
+
+
+def _instructions(function: casadi.Function, places: Sequence[str]) -> str | None:
+    """Instructions of the function in C, its inputs taken from `places`."""
+    lines = [f"v {', '.join(f'a{i}' for i in range(function.sz_w()))};"]
+    for name, given, out, value in operations(function):
+        if name == "CONST" and math.isfinite(value):
             lines.append(f"a{out[0]} = K({value!r});")
         elif name == "INPUT":
             lines.append(f"a{out[0]} = {places[given[0]].format(given[1])};")

@@ -41,6 +41,7 @@ HOUSE: dict[float, dict[str, str]] = {
     3: {"simulate": "the MMG simulator and ships of the literature"},
     3.2: {"estimation": "the ship's coefficients with priors: forward model, linearisation, evidence, calibration"},
     3.5: {"predictors": "one model a file; `physics_model/` and `networks/` hold what they share"},
+    3.7: {"exporting": "fitted physics for other programs, one format a file"},
     4: {"data": "data sets, files, corrections"},
     4.3: {"importing": "logs into data sets"},
     4.5: {"checking": "one fault of measured data a file"},

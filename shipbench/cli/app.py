@@ -20,6 +20,7 @@ from . import contract as cli_contract
 from . import data as cli_data
 from . import demo as cli_demo
 from . import diagnosis as cli_diagnosis
+from . import exporting as cli_export
 from . import importing as cli_import
 from . import leaderboard as cli_leaderboard
 from . import parts as cli_parts
@@ -43,7 +44,7 @@ from .common import (
 
 _GROUPS = {
     "Your data": ("demo", "data", "diagnose"),
-    "Models": ("models", "effects", "check", "predict"),
+    "Models": ("models", "effects", "check", "predict", "export"),
     "Results": ("run", "leaderboard", "learning-curve", "report"),
     "For developers": ("validate", "suite"),
 }
@@ -103,6 +104,7 @@ cli_check.register(cli_data.data_app, cli_diagnosis.suite_app)
 cli_leaderboard.register(app)
 cli_report.register(app)
 cli_parts.register(app)
+cli_export.register(app)
 
 
 def _show_version(wanted: bool) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 from ..ops import Array
 from ..ship import Particulars
 from ..signals import PSI, U, V
-from .base import Effect, Parameter, per_run
+from .base import Effect, Parameter, body_axes, per_run
 
 
 class HeadingBias(Effect):
@@ -33,8 +33,7 @@ class HeadingBias(Effect):
         out = S.copy()
         out[..., PSI] += bias
         if turned:
-            own = (S[..., U] + 1j * S[..., V]) * np.exp(-1j * bias * turned[0])
-            out[..., U], out[..., V] = own.real, own.imag
+            out[..., U], out[..., V] = body_axes(S[..., U], S[..., V], bias * turned[0])
         return out
 
     def settings(self, positions: np.ndarray, ship: Particulars) -> list[tuple[float, ...]]:

@@ -29,19 +29,22 @@ _SHIP_DIFFERS = 0.01
 @dataclass(frozen=True)
 class Origin:
     """Training data of a model: sample time [s], inputs, actuators ("measured" or "commanded"), the ship's name, L, B,
-    T [m] and displacement [m^3] (empty where an older saved model does not state them)."""
+    T [m] and displacement [m^3], fingerprint of the training runs (empty where an older saved model does not state
+    them)."""
 
     dt: float
     inputs: tuple[str, ...]
     actuators: str = ""
     ship: str = ""
     size: tuple[float, ...] = ()
+    fingerprint: str = ""
 
     @classmethod
     def of(cls, data: Dataset) -> Origin:
         ship = data.ship
         volume = ship.displacement if ship.displacement is not None else float(ship.mass or 0.0) / ship.rho
-        return cls(data.dt, data.inputs, data.actuators, ship.name, (ship.L, ship.B, ship.T, volume))
+        size = (ship.L, ship.B, ship.T, volume)
+        return cls(data.dt, data.inputs, data.actuators, ship.name, size, data.fingerprint)
 
 
 def remembers_origin(fit: Callable[..., Any]) -> Callable[..., Any]:
@@ -197,6 +200,7 @@ def origin_of(meta: dict[str, Any]) -> Origin | None:
             str(made["actuators"]),
             str(made["ship"]),
             tuple(map(float, made["size"])),
+            str(made.get("fingerprint", "")),
         )
     inner = meta["meta"].get("physics", meta["meta"])
     return Origin(sample_time(inner), tuple(meta["inputs"])) if "dt" in inner else None

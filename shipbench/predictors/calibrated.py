@@ -179,16 +179,20 @@ class Calibrated(FittedShip):
 
     def actuator_path(self, s0: np.ndarray, U: np.ndarray) -> np.ndarray:
         """n, delta, F_b, F_s at the beginning, middle and end of every substep, (batch, K * substeps, 3, 4)."""
+        steps = U.shape[1] * self.substeps
+        path = np.empty((len(s0), steps, 3, 4))
+        for i, gear in enumerate(self.dynamics()):
+            fine = gear_path(s0[:, 6 + i], U[:, :, i], self.dt, gear, 2 * self.substeps)
+            path[:, :, :, i] = np.stack([fine[:, stage : stage + 2 * steps - 1 : 2] for stage in range(3)], axis=-1)
+        return path
+
+    def dynamics(self) -> tuple[Gear, ...]:
+        """Dynamics of n, delta, F_b, F_s, with the effects that change them."""
         gears = dict(self.gears)
         if self.commanded and self.extension is not None:
             for active in self.extension.active("gear"):
                 active.effect.gear(gears, active.q)
-        steps = U.shape[1] * self.substeps
-        path = np.empty((len(s0), steps, 3, 4))
-        for i, key in enumerate(ACTUATOR_OF):
-            fine = gear_path(s0[:, 6 + i], U[:, :, i], self.dt, gears[key], 2 * self.substeps)
-            path[:, :, :, i] = np.stack([fine[:, stage : stage + 2 * steps - 1 : 2] for stage in range(3)], axis=-1)
-        return path
+        return tuple(gears[key] for key in ACTUATOR_OF)
 
     def _rollout(self, s0: np.ndarray, U: np.ndarray, history: History | None) -> np.ndarray:
         forces, sensors = self._active("force"), self._active("sensor")

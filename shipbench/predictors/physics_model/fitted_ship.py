@@ -11,11 +11,12 @@ import numpy as np
 
 from ...estimation.actuator_fit import DEFAULT_ACTUATORS
 from ...estimation.eq2_rollout import actuators_after
-from ...estimation.extension import Active, Extension, extension_of, geared, no_gear
+from ...estimation.extension import ACTUATOR_OF, Active, Extension, extension_of, geared, no_gear
 from ...estimation.gears import gears_of
 from ...estimation.rollout import Slopes
 from ...ops import Array
 from ...physics import eq2
+from ...physics.actuators import Gear
 from ...physics.modifiers import Flow
 from ...records import Dataset
 from ...ship import Ship, complete
@@ -44,6 +45,10 @@ class FittedShip(PredictorBase):
     @abstractmethod
     def forces(self) -> tuple[Sequence[Array], list[Active]]:
         """Fitted values of p0..p10, and the effects that act as forces with theirs."""
+
+    @abstractmethod
+    def describe(self) -> str:
+        """Text of the fitted equations."""
 
     @abstractmethod
     def accelerations(
@@ -111,8 +116,21 @@ class FittedShip(PredictorBase):
         gears = [] if self.extension is None else self.extension.active("gear")
         if not gears:
             return path
-        base = dict.fromkeys(("n", "delta", "F"), no_gear(h)) if self.commanded else gears_of(self.actuator_params)
-        return geared(path, s0, U, base, gears, self.dt, self.substeps)
+        return geared(path, s0, U, self._plain_gears(), gears, self.dt, self.substeps)
+
+    def _plain_gears(self) -> dict[str, Gear]:
+        """Dynamics of shaft, rudder and thrusters without effects."""
+        if self.commanded:
+            return dict.fromkeys(("n", "delta", "F"), no_gear(self.dt / self.substeps))
+        return gears_of(self.actuator_params)
+
+    def dynamics(self) -> tuple[Gear | None, ...]:
+        """Dynamics of n, delta, F_b, F_s, with the effects that change them; None where the command is the actuator."""
+        plain = self._plain_gears()
+        gears = dict(plain)
+        for effect, q in self.extension.active("gear") if self.extension is not None else []:
+            effect.gear(gears, q)
+        return tuple(None if self.commanded and gears[key] == plain[key] else gears[key] for key in ACTUATOR_OF)
 
     def _wind_columns(self) -> list[int]:
         """Columns of U with the measured wind's speed and direction; none where it was not measured."""
