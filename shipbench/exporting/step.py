@@ -187,6 +187,12 @@ class _Line:
         self.name, self.parts, self.gear, self.held, self.late = name, parts, gear, 0, (0, 0.0)
         channels = []
         if gear is not None:
+            if gear.delay < 0.0:
+                raise InputError(
+                    f"the model cannot be exported: its {name} follows commands {-gear.delay:.3g} s before they are "
+                    "given (a negative delay), which a step does not know. Accepted: delays from 0 s. Fit the model "
+                    "without the delay."
+                )
             part = dt / parts
             whole = math.floor(gear.delay / part)
             self.late, self.part = (whole, gear.delay / part - whole), part
