@@ -14,6 +14,7 @@ EXTRAS = {
     "scikit_posthocs": ("scikit-posthocs", "diagrams"),
     "nonlinear_benchmarks": ("nonlinear_benchmarks", "nonlinear-benchmarks"), "distributed": ("distributed", "dask"),
     "openpyxl": ("openpyxl", "excel"), "h5py": ("h5py", "matlab"), "matio": ("mat-io", "matlab"),
+    "fmpy": ("fmpy", "fmu"),
 }  # fmt: skip
 """Name on the package index and extra of each optional package, by the name under which it is imported (pyproject.toml
 has the versions)."""

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from exporting_cases import CURRENT, GEARS, PHYSICS, largest
+from exporting_cases import CURRENT, GEARS, LONG, PHYSICS, largest
 
 from shipbench.errors import InputError, WorkError
 from shipbench.exporting import fmu
