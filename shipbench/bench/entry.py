@@ -17,7 +17,7 @@ from ..storage import Frame
 from .regimes import COLUMNS as FEATURES
 from .results import STATUSES
 from .scoring import BAND, DIVERGED_DISTANCE, HORIZONS_S, columns
-from .task import make_task
+from .task import MEASURED, make_task
 
 Refuse = Callable[[str], InputError]
 """Function that makes the error from its message; it adds the folder."""
@@ -66,6 +66,10 @@ class _Runs(_Part):
     test: list[str] = Field(min_length=1)
 
 
+class _Twin(_Part):
+    fingerprint: str
+
+
 class Entry(_Part):
     """Cell of summary.json: the keys that pages and checks read. Other keys are kept but not shown."""
 
@@ -96,6 +100,8 @@ class Entry(_Part):
     fit_shared_by: int = Field(ge=1)
     predict_s: Seconds
     parameters: int | None = Field(None, ge=0)
+    train_on: str = MEASURED
+    simulated: _Twin | None = None
     code: _Code
     machine: _Machine
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 from ..effects.base import EFFECTS
 from ..errors import InputError, ShipbenchError
@@ -32,6 +32,8 @@ class ModelFacts:
         plugins: versions of the model's and its effects' plug-ins ("" for shipbench's own).
         code: digests of the packages that it takes, which a worker compares with its own (`package_digest`).
         origin: training data of a saved model.
+        learns: its fit learns from the runs.
+        warm: it has a warm start (see `Predictor`).
     """
 
     foreign: bool
@@ -41,6 +43,24 @@ class ModelFacts:
     plugins: list[str] = field(default_factory=list)
     code: dict[str, str] = field(default_factory=dict)
     origin: Origin | None = None
+    learns: bool = True
+    warm: bool = False
+
+
+class _Made(NamedTuple):
+    """Facts that only the model itself tells, as those of `ModelFacts`."""
+
+    seeded: bool
+    together: bool
+    files: dict[str, bytes]
+    origin: Origin | None
+    learns: bool
+    warm: bool
+
+
+def learns(spec: Spec, model: Any) -> bool:
+    """Whether the fit of a model learns from the runs: not where it comes fitted, is a simulator, or says so."""
+    return not spec.saved and not spec.reader and getattr(model, "learns", True) is not False
 
 
 def facts_of(spec: Spec) -> ModelFacts:
@@ -62,10 +82,11 @@ def facts_of(spec: Spec) -> ModelFacts:
         made = _made(spec)
     if isinstance(made, ShipbenchError):
         raise made
-    seeded, together, files, origin = made
     plugins = [registry.digest(name) for registry, name in taken]
     code = {"shipbench": source_digest(), **{package: package_digest(package) for package in packages}}
-    return ModelFacts(foreign, seeded, together, files, plugins, code, origin)
+    return ModelFacts(
+        foreign, made.seeded, made.together, made.files, plugins, code, made.origin, made.learns, made.warm
+    )
 
 
 def _kind(spec: Spec) -> str:
@@ -79,7 +100,7 @@ def _kind(spec: Spec) -> str:
     return str(read_meta(spec.path)["predictor"])
 
 
-def _made_alone(spec: Spec) -> tuple[bool, bool, dict[str, bytes], Origin | None] | ShipbenchError:
+def _made_alone(spec: Spec) -> _Made | ShipbenchError:
     """Result of `_made` in a process of its own, without Ctrl-C: any exception is the model's."""
     try:
         return _made(spec)
@@ -87,15 +108,17 @@ def _made_alone(spec: Spec) -> tuple[bool, bool, dict[str, bytes], Origin | None
         return InputError(f"model '{spec.text}' cannot be made: {reason(error)}. Correct its file.")
 
 
-def _made(spec: Spec) -> tuple[bool, bool, dict[str, bytes], Origin | None] | ShipbenchError:
-    """Facts (seeded, together, files, origin), or the reason why the model cannot be made."""
+def _made(spec: Spec) -> _Made | ShipbenchError:
+    """Facts, or the reason why the model cannot be made."""
     try:
         model: Any = make_predictor(spec)
-        return (
+        return _Made(
             getattr(model, "seeded", True) is not False,
             hasattr(type(model), "fit_group"),
             _files(spec),
             getattr(model, "origin", None),
+            learns(spec, model),
+            hasattr(model, "warm_start"),
         )
     except ShipbenchError as error:
         return error

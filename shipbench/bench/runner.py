@@ -33,6 +33,7 @@ from .scoring import columns, divergence, measure
 from .study import Part, Study
 from .submissions import Results
 from .task import Task
+from .twins import check_twins, training_notes
 from .work import Answer, digests
 
 
@@ -157,10 +158,15 @@ def _prepare(task: Task, memory: Memory) -> Study:
     notes += tuple(
         note for spec, known in zip(specs, facts, strict=True) for note in check_origin(spec.text, known.origin, data)
     )
+    simulated = None
+    if task.simulated is not None:
+        simulated = memory.data.get(task.simulated) or load_dataset(task.simulated)
+        check_twins(simulated, data)
+        notes += training_notes(task, specs, facts, simulated)
     folds = make_folds(data, task)
     batches = [fold.test.batch(task.history(data.dt)) for fold in folds]
     found = [asdict(c) for c in columns(task.metrics, task.horizon_s, data.dt, task.bands)]
-    return Study(task, data, folds, batches, specs, facts, (*data.notes, *notes), found)
+    return Study(task, data, folds, batches, specs, facts, (*data.notes, *notes), found, simulated)
 
 
 def _refuse_elsewhere(studies: Sequence[Study], execution: Execution) -> None:
@@ -223,10 +229,13 @@ def _answers(
 
 
 def _identity(part: Part, key: str, answer: Answer) -> dict[str, Any]:
-    """Key of the cell and digests of the user's code behind it; no key where the model loaded code or read files that
-    the key does not cover."""
+    """Key of the cell, its training runs and digests of the user's code behind it; no key where the model loaded code
+    or read files that the key does not cover."""
+    twin = part.study.simulated
     identity: dict[str, Any] = {
         "key": key,
+        "train_on": part.train_on,
+        **({} if twin is None else {"simulated": {"name": twin.name, "fingerprint": twin.fingerprint}}),
         "model_code": {name: digest[:16] for name, digest in digests(part.facts.files).items()},
     }
     if part.spec.given is not None:
@@ -279,7 +288,7 @@ def _rows(
     runs = study.folds[cell.fold].test.runs
     identity = {
         "protocol": PROTOCOL, "dataset": cell.dataset, "fingerprint": study.data.fingerprint,
-        "task": study.task.key(study.data.fingerprint), "model": cell.model, "fold": cell.fold, "seed": cell.seed,
+        "task": study.key, "model": cell.model, "fold": cell.fold, "seed": cell.seed,
     }  # fmt: skip
     per_run = {
         "run": [r.id for r in runs],
@@ -300,7 +309,7 @@ def _summary(study: Study, spec: Spec, cell: Cell, answer: Answer, times: dict[s
     data, fold = study.data, study.folds[cell.fold]
     return {
         "protocol": PROTOCOL, "dataset": data.name, "fingerprint": data.fingerprint,
-        "task_key": study.task.key(data.fingerprint),
+        "task_key": study.key,
         "task": study.task.model_dump(mode="json"), "model": cell.model, "name": spec.name,
         "params": spec.params if answer.params is None else answer.params,
         "parameters": answer.parameters,

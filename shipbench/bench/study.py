@@ -6,6 +6,7 @@ import hashlib
 import json
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import product
 
 import numpy as np
 
@@ -17,13 +18,14 @@ from ..specs import Spec
 from .folds import Fold
 from .models import ModelFacts
 from .results import PROTOCOL, Cell
-from .task import Task
+from .task import MEASURED, Task, row_label
+from .twins import trained_on, twin_windows
 from .work import Answer, FoldData, Job, digests
 
 
 @dataclass(frozen=True, eq=False)
 class Study:
-    """Task with its data, folds and parsed models."""
+    """Task with its data, folds and parsed models, and the simulated twin of the data where the task has one."""
 
     task: Task
     data: Dataset
@@ -33,6 +35,12 @@ class Study:
     facts: list[ModelFacts]
     notes: tuple[str, ...]
     columns: list[dict[str, str]] = field(default_factory=list)
+    simulated: Dataset | None = None
+
+    @cached_property
+    def key(self) -> str:
+        """Digest of the settings that decide the scored data (`Task.key`)."""
+        return self.task.key(self.data.fingerprint, "" if self.simulated is None else self.simulated.fingerprint)
 
     @cached_property
     def fold_data(self) -> list[FoldData]:
@@ -51,22 +59,33 @@ class Study:
         ]
 
     @cached_property
+    def twins(self) -> dict[str, Run]:
+        """Windows of the simulated twin by the ids of the measured ones."""
+        if self.simulated is None:
+            return {}
+        kept: dict[str, Run] = {}
+        found = twin_windows(self.simulated, self.data, self.task)
+        _column_by_column(self.data.with_runs(found.values()), kept)
+        return kept
+
+    @cached_property
     def metric_plugins(self) -> list[str]:
         """Versions of the plug-ins that scores come from ("" for a metric of shipbench's own)."""
         return [METRICS.digest(name) for name in self.task.metrics]
 
     def parts(self) -> list[Part]:
         """Cells of the study: the folds of a model and seed as one part where its class fits them together, else each
-        cell as its own."""
+        cell as its own; a model that learns nothing has one row for all choices of training runs."""
         parts = []
         for spec, facts in zip(self.specs, self.facts, strict=True):
             seeds = spec.seeds or list(self.task.seeds)
             if not facts.seeded:  # it draws no random numbers: one seed is enough
                 seeds = seeds[:1]
-            for seed in seeds:
-                cells = [Cell(self.data.name, spec.text, fold.index, seed) for fold in self.folds]
+            for train_on, seed in product(self.task.train_on if facts.learns else (MEASURED,), seeds):
+                label = row_label(spec.text, train_on)
+                cells = [Cell(self.data.name, label, fold.index, seed) for fold in self.folds]
                 parts += [
-                    Part(self, spec, group, facts)
+                    Part(self, spec, group, facts, train_on)
                     for group in ([cells] if facts.together else [[cell] for cell in cells])
                 ]
         return parts
@@ -80,6 +99,7 @@ class Part:
     spec: Spec
     cells: list[Cell]
     facts: ModelFacts
+    train_on: str = MEASURED
 
     @property
     def label(self) -> str:
@@ -95,7 +115,7 @@ class Part:
     def keys(self) -> list[str]:
         """Digest, for each cell, of everything that decides its content; `--resume` keeps a cell only where it
         agrees."""
-        task, data = self.study.task, self.study.data
+        task = self.study.task
         files, facts = digests(self.facts.files), self.facts
         keys = []
         for cell in self.cells:
@@ -105,7 +125,7 @@ class Part:
                 for side in (fold.train, fold.valid, fold.test)
             ]
             parts = [
-                PROTOCOL, task.key(data.fingerprint), task.metrics, runs, cell.model, cell.fold, cell.seed, files,
+                PROTOCOL, self.study.key, task.metrics, runs, cell.model, cell.fold, cell.seed, files,
                 facts.plugins, facts.code, self.study.metric_plugins, task.bands,
             ]  # fmt: skip
             keys.append(hashlib.sha256(json.dumps(parts, default=str).encode()).hexdigest()[:16])
@@ -114,7 +134,8 @@ class Part:
     @property
     def fold_data(self) -> list[FoldData]:
         """Fold data of each cell."""
-        return [self.study.fold_data[cell.fold] for cell in self.cells]
+        twins, warm = self.study.twins, self.facts.warm
+        return [trained_on(self.train_on, self.study.fold_data[cell.fold], twins, warm) for cell in self.cells]
 
     def job(self, send_files: bool, device: str | None) -> Job:
         """Job for a worker, without `fold_data`."""

@@ -79,11 +79,13 @@ def check_submission(folder: Path, rows: Frame, summaries: Any) -> Frame:
 
 def _check_task(summary: dict[str, Any], keys: dict[str, str], refuse: Any) -> None:
     label = Cell(summary["dataset"], summary["model"], summary["fold"], summary["seed"]).label
-    text = json.dumps([summary["task"], summary["fingerprint"], summary["columns"], summary["dt"]], sort_keys=True)
+    twin = (summary.get("simulated") or {}).get("fingerprint", "")
+    known = [summary["task"], summary["fingerprint"], twin, summary["columns"], summary["dt"]]
+    text = json.dumps(known, sort_keys=True)
     first = text not in keys
     try:
         if first:
-            keys[text] = make_task(summary["task"]).key(summary["fingerprint"])
+            keys[text] = make_task(summary["task"]).key(summary["fingerprint"], twin)
     except InputError as error:
         raise refuse(
             f"{label}: this version does not know the task ({error})", "Update shipbench, or run the models again."

@@ -5,9 +5,9 @@ from __future__ import annotations
 import hashlib
 import json
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationInfo, field_validator
 
 from ..errors import InputError, option, unknown_name
 from ..metrics.base import METRICS
@@ -25,7 +25,12 @@ DEFAULT_METRICS = (
     "trial_indices",
 )
 _Seed = Annotated[Whole, Field(ge=0, lt=2**32)]
-_NOT_IDENTITY = {"models", "metrics", "seeds", "title", "bands"}
+_NOT_IDENTITY = {"models", "metrics", "seeds", "title", "bands", "train_on"}
+MEASURED: Literal["measured"] = "measured"
+SIMULATED: Literal["simulated"] = "simulated"
+BOTH: Literal["simulated+measured"] = "simulated+measured"
+TrainOn = Literal["measured", "simulated", "simulated+measured"]
+"""Runs that a model is trained on; it is always scored on measured ones."""
 
 
 class Task(BaseModel):
@@ -40,6 +45,8 @@ class Task(BaseModel):
     only that many runs for fitting and early stopping together, the same scored runs (`valid_runs` shrinks in
     proportion, to one at least). `max_runs`: use only that many runs, evenly spread over the data set. `bands`: score
     90 % bands, too (see `bands`); every model is fitted five times more, and its prediction stays the same.
+    `simulated`: simulated twin of the data set (see `twins`). `train_on`: runs that every model is trained on,
+    "measured", "simulated" and "simulated+measured"; a row for each (default: all three where `simulated` is given).
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
@@ -69,6 +76,8 @@ class Task(BaseModel):
     max_runs: Whole | None = Field(None, ge=2)
     fold_seed: _Seed = 0
     bands: bool = False
+    simulated: str | None = None
+    train_on: tuple[TrainOn, ...] = Field((), validate_default=True)
     title: str = ""
 
     @field_validator("models", "seeds", "metrics")
@@ -91,6 +100,26 @@ class Task(BaseModel):
             raise ValueError("'ed' must be among the metrics: models are ranked by it")
         return value
 
+    @field_validator("train_on")
+    @classmethod
+    def _with_twins(cls, value: tuple[TrainOn, ...], info: ValidationInfo) -> tuple[TrainOn, ...]:
+        if info.data.get("simulated") is None:
+            if set(value) - {MEASURED}:
+                raise ValueError(
+                    f"no simulated runs are given; add {option('--simulated FOLDER', 'simulated=FOLDER')}, made by "
+                    "`shipbench data simulate MODEL --like TRIAL --out FOLDER`"
+                )
+            return (MEASURED,)
+        chosen: tuple[TrainOn, ...] = tuple(dict.fromkeys(value)) or get_args(TrainOn)
+        if info.data.get("bands") and chosen != (MEASURED,):
+            raise ValueError("bands are computed for models trained on measured runs only; leave bands out")
+        labels = [row_label(model, choice) for model in info.data.get("models", ()) for choice in chosen]
+        if twice := [label for label in labels if labels.count(label) > 1]:
+            raise ValueError(f"two rows would be named '{twice[0]}'; rename the model")
+        for label in labels:
+            check_label(label, "model", LONGEST_LABEL)
+        return chosen
+
     def __repr__(self) -> str:
         return brief(super().__repr__())
 
@@ -106,13 +135,27 @@ class Task(BaseModel):
         """Distance of scored windows in samples, or None for windows that do not overlap."""
         return samples(self.stride_s, dt, "stride_s") if self.stride_s else None
 
-    def key(self, fingerprint: str) -> str:
-        """Digest of all settings that decide the scored data; rows are ranked together only where it agrees."""
+    def key(self, fingerprint: str, simulated: str = "") -> str:
+        """Digest of all settings that decide the scored data; rows are ranked together only where it agrees.
+
+        Args:
+            fingerprint: of the data set.
+            simulated: fingerprint of its simulated twin, where the task has one.
+        """
         data = self.model_dump(mode="json", exclude=_NOT_IDENTITY)
         if self.train_runs is None:
             del data["train_runs"]  # tasks from before this key keep theirs
+        if self.simulated is None:
+            del data["simulated"]
+        else:
+            data["simulated"] = simulated
         data["dataset"] = fingerprint  # the data's own digest: the same data under another path is the same task
         return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()[:12]
+
+
+def row_label(model: str, train_on: str) -> str:
+    """Label of a model in tables: `mlp (simulated)`; trained on measured runs it has its own name alone."""
+    return model if train_on == MEASURED else f"{model} ({train_on})"
 
 
 def samples(seconds: float, dt: float, name: str) -> int:

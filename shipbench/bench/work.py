@@ -42,7 +42,10 @@ CancelledError and an exit."""
 @dataclass(frozen=True, eq=False)
 class FoldData:
     """Data of a fold that a model may see: windows for fitting and for early stopping, and start, inputs, history and
-    context of the scored windows."""
+    context of the scored windows.
+
+    `before`: windows for a first fit and its early stopping, from which the fit goes on (a warm start).
+    """
 
     train: Dataset
     valid: Dataset | None
@@ -50,6 +53,12 @@ class FoldData:
     U: np.ndarray
     history: History | None
     context: Context | None = None
+    before: tuple[Dataset, Dataset | None] | None = None
+
+    @property
+    def fits(self) -> list[tuple[Dataset, Dataset | None]]:
+        """Training and validation data of the fits, one after the other."""
+        return [*([self.before] if self.before else []), (self.train, self.valid)]
 
 
 @dataclass(frozen=True)
@@ -211,7 +220,9 @@ def _fit(job: Job, folds: Sequence[FoldData]) -> list[_Fit]:
     group, began = getattr(type(models[0]), "fit_group", None), time.perf_counter()
     if group is not None and len(folds) > 1:
         try:
-            group(models, [fold.train for fold in folds], [fold.valid for fold in folds], [seed] * len(folds))
+            for parts in zip(*(fold.fits for fold in folds), strict=True):
+                group(models, [train for train, _ in parts], [valid for _, valid in parts], [seed] * len(folds))
+                _start_warm(models, folds)
             seconds = (time.perf_counter() - began) / len(folds)
             return [_Fit(model, seconds, len(folds)) for model in models]
         except _RAISED as error:  # one fold is enough to fail them all: each gets its chance alone
@@ -221,12 +232,21 @@ def _fit(job: Job, folds: Sequence[FoldData]) -> list[_Fit]:
     for model, fold in zip(models, folds, strict=True):
         began, reason = time.perf_counter(), ""
         try:
-            model.fit(fold.train, fold.valid, seed=seed)
+            for train, valid in fold.fits:
+                model.fit(train, valid, seed=seed)
+                _start_warm([model], [fold])
         except _RAISED as error:
             _let_stop_through(error)
             reason = f"fit: {one_line(error)}"
         fits.append(_Fit(model, time.perf_counter() - began, error=reason))
     return fits
+
+
+def _start_warm(models: Sequence[Any], folds: Sequence[FoldData]) -> None:
+    """Let the next fit of the models go on from this one, where their folds have two."""
+    for model, fold in zip(models, folds, strict=True):
+        if fold.before:
+            model.warm_start = True
 
 
 def _predicted(fit: _Fit, fold: FoldData) -> Answer:

@@ -35,6 +35,7 @@ from .common import (
     Quiet,
     exit_if_failed,
     parse_seeds,
+    parse_words,
     print_json,
     say,
     say_wrapped,
@@ -124,6 +125,25 @@ def _main(
     pass
 
 
+_Split = Annotated[
+    str | None,
+    typer.Option(
+        help="folds, published, kind (leave one kind of manoeuvre out), speed (score the fastest) or extrapolate "
+        "(train on small rudder angles, drift angles and speeds, score beyond them)."
+    ),
+]
+_Simulated = Annotated[
+    str | None, typer.Option(help="Simulated twin of the data set, as `shipbench data simulate` writes it.")
+]
+_TrainOn = Annotated[
+    str | None,
+    typer.Option(
+        help="With --simulated: measured, simulated or simulated+measured; several with commas between (default: "
+        "all three). Scored on measured runs always."
+    ),
+]
+
+
 @app.command()
 def run(
     ctx: typer.Context,
@@ -135,13 +155,7 @@ def run(
         str | None, typer.Option("-c", "--config", help="Task file (TOML), or the name of a shipped one: paper, smoke.")
     ] = None,
     folds: Annotated[int | None, typer.Option(help="Number of folds (default 5).")] = None,
-    split: Annotated[
-        str | None,
-        typer.Option(
-            help="folds, published, kind (leave one kind of manoeuvre out), speed (score the fastest) or extrapolate "
-            "(train on small rudder angles, drift angles and speeds, score beyond them)."
-        ),
-    ] = None,
+    split: _Split = None,
     seeds: Annotated[str | None, typer.Option(help="Seeds, such as 0,1,2 (default 0).")] = None,
     horizon: Annotated[float | None, typer.Option(help="Seconds to predict (default 120).")] = None,
     history: Annotated[
@@ -152,6 +166,8 @@ def run(
     bands: Annotated[
         bool, typer.Option("--bands", help="Score 90 % bands of position and heading, too: five more fits of each.")
     ] = False,
+    simulated: _Simulated = None,
+    train_on: _TrainOn = None,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -198,7 +214,7 @@ def run(
         "models": model or None, "datasets": dataset or None, "folds": folds, "split": split,
         "seeds": parse_seeds(seeds),
         "horizon_s": horizon, "history_s": history, "stride_s": stride, "max_runs": max_runs,
-        "bands": bands or None,
+        "bands": bands or None, "simulated": simulated, "train_on": parse_words(train_on),
     }  # fmt: skip
     execution = Execution(executor, workers, scheduler, Limits(time_limit, memory_limit), device, wait)
     tasks = load_tasks(config, overrides)

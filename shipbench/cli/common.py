@@ -109,6 +109,11 @@ def parse_seeds(text: str | None) -> tuple[int, ...] | None:
     return None if text is None else parse_numbers("--seeds", text)
 
 
+def parse_words(text: str | None) -> tuple[str, ...] | None:
+    """Words of an option with commas between them, or None where it is not given."""
+    return None if text is None else tuple(word.strip() for word in text.split(",") if word.strip())
+
+
 def exit_if_failed(failed: Sequence[str], what: str) -> None:
     """Name the fits that failed and end with exit code 1, if there are any; `what` heads the list."""
     if failed:

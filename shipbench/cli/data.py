@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
 from pathlib import Path
 from typing import Annotated
@@ -9,9 +10,23 @@ from typing import Annotated
 import typer
 
 from ..errors import InputError
-from .common import SETTINGS, Commands, DatasetArgument, Full, Json, Quiet, print_json, say, say_wrapped, show_table
+from .common import (
+    SETTINGS,
+    Commands,
+    DatasetArgument,
+    Device,
+    Full,
+    Json,
+    Quiet,
+    print_json,
+    say,
+    say_wrapped,
+    show_table,
+)
 
-data_app = typer.Typer(cls=Commands, help="Data sets: list, get, make, check, describe, export, import.", **SETTINGS)
+data_app = typer.Typer(
+    cls=Commands, help="Data sets: list, get, make, check, describe, export, import, simulate.", **SETTINGS
+)
 
 
 @data_app.command("list")
@@ -139,6 +154,40 @@ def data_export(
     form = check_format(format, out, what)
     written = export_predictions(Path(what), out, form) if dataset is None else export_dataset(dataset, out, form)
     say(f"Written: {', '.join(map(str, written))}")
+
+
+@data_app.command("simulate")
+def data_simulate(
+    model: Annotated[
+        str,
+        typer.Argument(
+            metavar="MODEL",
+            help="Model that needs no fit: folder of a saved model, sim.py:simulate, ship.fmu, oracle, or physics (as "
+            "the particulars of the ship give it).",
+        ),
+    ],
+    like: Annotated[str, typer.Option("--like", help="Measured data set: registered name or folder.")],
+    out: Annotated[
+        Path | None, typer.Option("-o", "--out", help="Folder to write (default: <data set>-simulated).")
+    ] = None,
+    device: Device = None,
+    quiet: Quiet = False,
+) -> None:
+    """Simulate every run of a data set from its measured start with its inputs: its simulated twin."""
+    from ..bench.twins import mean_distance, simulate_like
+    from ..data.base import load_dataset
+    from ..data.files import read_description, write_dataset
+
+    data = load_dataset(like)
+    twin = simulate_like(model, data, device)
+    folder = out or Path(twin.name)
+    if (there := folder / "dataset.toml").exists() and (other := read_description(there).name) != twin.name:
+        raise InputError(f"--out {folder} holds the data set '{other}'; accepted: a new folder. Give another --out.")
+    write_dataset(twin, folder)
+    away = f"{mean_distance(twin, data):.3g} m from the measured positions on average"
+    say(f"Written: {folder} ({len(twin)} runs, {away})")
+    if not quiet:
+        say(f"Train on it: shipbench run -m mlp --dataset {shlex.quote(like)} --simulated {shlex.quote(str(folder))}")
 
 
 def register(app: typer.Typer) -> None:

@@ -51,6 +51,8 @@ class Predictor(Protocol):
         skip: `skip(dataset)`, the reason why it cannot take a data set, or None.
         predict_samples: `predict_samples(s0, U, samples)`, random records (samples, batch, K, 6 or 10) of the motion; a
             band takes its shape from them.
+        learns: False where `fit` learns nothing from the runs (a simulator).
+        warm_start: an attribute of that name that is set to True lets the next `fit` go on from the last one.
         num_parameters: count of fitted numbers.
         seeded: False where nothing is drawn at random.
         context: an argument of `predict` of that name is given the `Context` of the runs.

@@ -22,6 +22,7 @@ class Hold(PredictorBase):
 
     name: ClassVar[str] = "hold"
     seeded: ClassVar[bool] = False
+    learns: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         self.dt = float("nan")

@@ -31,6 +31,7 @@ from .networks.stacked import (
     StackedRuns,
     generators,
     hold_error,
+    load_members,
     padded,
     position_score,
     random_windows,
@@ -210,6 +211,7 @@ class LSTM(PredictorBase):
         check_numbers(self, {"hidden": WIDTH, "epochs": ROUNDS, "lr": RATE, "pose_weight": WEIGHT})
         self._weights: dict[str, np.ndarray] = {}
         self._dt, self._stride, self._commanded = 0.0, 1, False
+        self.warm_start = False
 
     @property
     def fitted(self) -> bool:
@@ -251,6 +253,8 @@ class LSTM(PredictorBase):
         )
         commanded = trains[0].actuators == "commanded"
         net = _Network(features, lead.hidden, scalers, draw, commanded)
+        if lead.warm_start:  # with the scales of the first fit, in which its weights are
+            load_members(net, [m._weights for m in models])
         task = _Rollouts(net, training, validation, lead._stages(training.steps), draw, dt * stride, lead.pose_weight)
         # one thread: in hundreds of small dependent steps threads mostly wait for each other
         train(task, Recipe(lr=lead.lr, lr_end=0.01, chunks=task.num_chunks, clip=1.0, device=lead.device, threads=1))

@@ -24,7 +24,7 @@ from ._one_step import NUM_CHANNELS, check_target, one_step_rollout, transitions
 from ._saved import check_shapes, sample_time
 from .base import History, PredictorBase
 from .device import check_device
-from .networks.stacked import Scaler, StackedMLP, StackedRuns, generators, padded, with_valid
+from .networks.stacked import Scaler, StackedMLP, StackedRuns, generators, load_members, padded, with_valid
 from .networks.training import Chunk, Recipe, StackedTask, epochs_of_samples, train
 
 _GATHERED, _SCORED = 256, 16384
@@ -34,8 +34,9 @@ _GATHERED, _SCORED = 256, 16384
 class _OneStep(StackedTask):
     """Standardised one-step regression of all members."""
 
-    def __init__(self, model: MLP, training: list[Any], validation: list[Any], seeds: Sequence[int]) -> None:
+    def __init__(self, models: Sequence[MLP], training: list[Any], validation: list[Any], seeds: Sequence[int]) -> None:
         super().__init__()
+        model = models[0]
         self.members, self.epochs, self.batch = len(seeds), model.epochs, model.batch
         self.increment = model.target == "increment"
         self.draw = generators(seeds)
@@ -43,6 +44,8 @@ class _OneStep(StackedTask):
         self.scale_z = Scaler.fit(self._target(y, after) for y, _, after in training)
         sizes = [NUM_CHANNELS + training[0][1].shape[-1], *[model.hidden] * model.layers, NUM_CHANNELS]
         self.net = StackedMLP(sizes, self.draw)
+        if model.warm_start:  # with the scales of the first fit, in which its weights are
+            load_members(self, [m._weights for m in models])
         self.counts = [len(y) for y, _, _ in training]
         self.data = self._standardised(training)
         self.valid = self._standardised(validation)
@@ -128,6 +131,7 @@ class MLP(PredictorBase):
         self._weights: dict[str, np.ndarray] = {}
         self._dt = 0.0
         self._epochs_run = 0
+        self.warm_start = False
 
     @property
     def fitted(self) -> bool:
@@ -151,7 +155,7 @@ class MLP(PredictorBase):
         features = InputFeatures(names)
         # Not bound to names: the samples as they are would otherwise be kept beside the standardised ones.
         trained, stopped = zip(*pairs, strict=True)
-        task = _OneStep(lead, _samples(trained, features), _samples(stopped, features), seeds)
+        task = _OneStep(models, _samples(trained, features), _samples(stopped, features), seeds)
         # one thread: with matrices this small threads mostly wait for each other
         watch = train(
             task,

@@ -27,6 +27,7 @@ class Oracle(PredictorBase):
 
     name: ClassVar[str] = "oracle"
     seeded: ClassVar[bool] = False
+    learns: ClassVar[bool] = False
 
     def skip(self, dataset: Dataset) -> str | None:
         """Reason why this model cannot take `dataset`, or None."""

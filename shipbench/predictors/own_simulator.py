@@ -35,6 +35,7 @@ class Simulator:
     """
 
     seeded = False
+    learns = False
 
     def __init__(self, function: Callable[..., Any], settings: Mapping[str, Any] | None = None) -> None:
         self.function, self.settings = function, dict(settings or {})

@@ -14,9 +14,10 @@ import numpy as np
 
 from ..errors import WorkError
 from ..estimation.actuator_fit import fit_actuators
-from ..estimation.eq2_rollout import Rolling
+from ..estimation.eq2_rollout import Rolling, parameter_scale
 from ..estimation.extension import Active, Extension, accelerations, measured, roll, true_start
 from ..estimation.gears import fit_gears
+from ..estimation.priors import EQ2
 from ..ops import Array
 from ..physics.modifiers import Flow
 from ..records import Batch, Dataset
@@ -103,6 +104,18 @@ class Physics(FittedShip):
             )
         self.p, self.ci95, self.cost = result.p, result.ci95, result.cost
         self.report = self._report(batch)
+        return self
+
+    def of_particulars(self, data: Dataset) -> Self:
+        """Take the ship as its particulars describe it, in place of a fit: p0..p10 at their means between ordinary
+        ships, actuators with ordinary dynamics. Nothing is learned from the runs of `data`.
+
+        Source: docs/calibration.md#ordinary-differences-between-ships.
+        """
+        self._set_ship(data.ship, data.inputs, data.dt, data.actuators == "commanded")
+        means = {prior.name: prior.centre for prior in EQ2}
+        self.p = parameter_scale(self.c) * [means.get(symbol, 0.0) for symbol, _, _ in PARAMETERS]
+        self.ci95, self.cost = np.full((len(PARAMETERS), 2), np.nan), np.nan
         return self
 
     def _report(self, batch: Batch) -> FitReport:

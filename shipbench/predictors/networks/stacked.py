@@ -7,7 +7,7 @@ Every layer is one batched matrix product: the run time of small networks on a C
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -138,6 +138,11 @@ class StackedLinear(nn.Module):
     def forward(self, x: Tensor) -> Tensor:
         """Outputs (members, batch, outputs) of inputs (members, batch, inputs)."""
         return torch.baddbmm(self.bias, x, self.weight)
+
+
+def load_members(module: nn.Module, weights: Sequence[Mapping[str, np.ndarray]]) -> None:
+    """Put the saved weights of every member, (1, ...) each, into a stacked module: a warm start."""
+    module.load_state_dict({name: torch.as_tensor(np.concatenate([w[name] for w in weights])) for name in weights[0]})
 
 
 class StackedMLP(nn.Module):
