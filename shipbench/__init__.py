@@ -7,7 +7,16 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .api import benchmark, check_data, diagnose, export_model, import_log, propose_mapping, report
+    from .api import (
+        benchmark,
+        check_data,
+        diagnose,
+        export_model,
+        import_log,
+        propose_mapping,
+        report,
+        simulate_like,
+    )
     from .bench.runner import run_tasks
     from .bench.submissions import read_results
     from .bench.task import Task, load_tasks
@@ -27,7 +36,7 @@ if TYPE_CHECKING:
 
 _HOME = {
     "benchmark": "api", "check_data": "api", "diagnose": "api", "export_model": "api", "import_log": "api",
-    "propose_mapping": "api", "report": "api", "Scores": "scores",
+    "propose_mapping": "api", "report": "api", "simulate_like": "api", "Scores": "scores",
     "build_board": "leaderboard.pages", "write_boards": "leaderboard.pages", "read_results": "bench.submissions",
     "run_tasks": "bench.runner", "Task": "bench.task", "load_tasks": "bench.task", "check_model": "contract.check",
     "DATASETS": "data.base", "load_dataset": "data.base",
@@ -43,7 +52,7 @@ __all__ = [
     "ShipbenchError", "Task", "WorkError", "__version__", "benchmark", "build_board", "check_data", "check_model",
     "diagnose", "export_model", "import_log",
     "load_dataset", "load_tasks", "make_predictor", "parse_spec", "propose_mapping", "read_results", "report",
-    "run_tasks", "write_boards",
+    "run_tasks", "simulate_like", "write_boards",
 ]  # fmt: skip
 
 

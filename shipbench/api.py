@@ -68,7 +68,7 @@ def benchmark(
         device: where networks compute: "cpu", "cuda" or "cuda:1".
         quiet: show no progress.
         options: other keys of a `Task`, such as history_s=10, split="kind", stride_s=30, max_runs=20, bands=True,
-            metrics=["ed"].
+            metrics=["ed"], or simulated=simulate_like("physics", data) for models trained on simulated runs, too.
 
     Raises:
         InputError: a model, data set or option cannot be used, or `out` holds another study; nothing has been fitted
@@ -92,10 +92,14 @@ def benchmark(
             "score them apart."
         )
     seeds = (seeds,) if isinstance(seeds, int) else tuple(seeds)
+    twin = options.get("simulated")
+    if twin is not None:
+        options["simulated"] = twin.name if isinstance(twin, Dataset) else os.fspath(twin)
     common = {"models": tuple(specs), "horizon_s": horizon, "folds": folds, "seeds": seeds, **options}
     tasks = [make_task({**common, "dataset": name}, "benchmark") for name in named]
     memory = Memory(
-        {name: d for name, d in named.items() if isinstance(d, Dataset)},
+        {name: d for name, d in named.items() if isinstance(d, Dataset)}
+        | ({twin.name: twin} if isinstance(twin, Dataset) else {}),
         {text: s for text, s in specs.items() if s.given is not None},
     )
     folder = Path(out) if out is not None else Path(tempfile.mkdtemp(prefix="shipbench-"))
@@ -144,6 +148,34 @@ def _named(models: Any) -> dict[str, Spec]:
         )
         specs[free] = replace(spec, text=free, name=free) if spec.given is not None else spec
     return specs
+
+
+def simulate_like(model: Any, data: Data, *, out: Place | None = None, device: str | None = None) -> Dataset:
+    """Simulate every run of a trial from its measured start with its inputs, as `shipbench data simulate` does.
+
+    `benchmark(models, data, simulated=...)` trains models on such a twin.
+
+    Args:
+        model: a model that needs no fit: the folder of a saved model, "sim.py:simulate", a function
+            `simulate(s0, U, dt)`, "ship.fmu", "oracle", or "physics" as the particulars of the ship give it.
+        data: the measured data set, its registered name or its folder.
+        out: folder to write it to, too.
+        device: "cpu", "cuda" or "cuda:1", where the model has a choice.
+
+    Returns:
+        The twin `<name>-simulated`: ids, metadata, times and inputs are those of `data`, the states are simulated.
+
+    Raises:
+        InputError: the model must be fitted first or cannot take these data, or `out` holds another data set.
+        WorkError: the model fails on a run, or its states are not finite.
+    """
+    from .bench.twins import simulate_like as simulated
+    from .bench.twins import write_twin
+
+    twin = simulated(model, _loaded(data), device)
+    if out is not None:
+        write_twin(twin, Path(out))
+    return twin
 
 
 class Verdict(Diagnosis):

@@ -9,12 +9,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..data.corrections import continuous
-from ..errors import InputError, ShipbenchError, WorkError
+from ..data.files import read_description, write_dataset
+from ..errors import InputError, ShipbenchError, WorkError, option
 from ..names import LONGEST
 from ..predictors._saved import check_origin
 from ..predictors._user_file import on_import_path
@@ -121,6 +123,21 @@ def mean_distance(twin: Dataset, data: Dataset) -> float:
     """Mean distance between the positions of the twins and of the measured runs [m], over time and then over runs."""
     gaps = [a.states[:, [X, Y]] - b.states[:, [X, Y]] for a, b in zip(twin.runs, data.runs, strict=True)]
     return float(np.mean([np.hypot(*gap.T).mean() for gap in gaps]))
+
+
+def write_twin(twin: Dataset, folder: Path) -> None:
+    """Write a twin as a data set; an older one of the same name is replaced.
+
+    Raises:
+        InputError: the folder holds another data set, such as the trial itself, or cannot be written.
+    """
+    there = folder / "dataset.toml"
+    if there.exists() and (other := read_description(there).name) != twin.name:
+        raise InputError(
+            f"{folder} holds the data set '{other}'; accepted: a new folder, or an older twin. Give another one with "
+            f"{option('--out', 'out=FOLDER')}."
+        )
+    write_dataset(twin, folder)
 
 
 def check_twins(twin: Dataset, data: Dataset) -> None:

@@ -174,16 +174,13 @@ def data_simulate(
     quiet: Quiet = False,
 ) -> None:
     """Simulate every run of a data set from its measured start with its inputs: its simulated twin."""
-    from ..bench.twins import mean_distance, simulate_like
+    from ..bench.twins import mean_distance, simulate_like, write_twin
     from ..data.base import load_dataset
-    from ..data.files import read_description, write_dataset
 
     data = load_dataset(like)
     twin = simulate_like(model, data, device)
     folder = out or Path(twin.name)
-    if (there := folder / "dataset.toml").exists() and (other := read_description(there).name) != twin.name:
-        raise InputError(f"--out {folder} holds the data set '{other}'; accepted: a new folder. Give another --out.")
-    write_dataset(twin, folder)
+    write_twin(twin, folder)
     away = f"{mean_distance(twin, data):.3g} m from the measured positions on average"
     say(f"Written: {folder} ({len(twin)} runs, {away})")
     if not quiet:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from pydantic import ValidationError
 
-from shipbench.bench.task import load_tasks, make_task, read_config
+from shipbench.bench.task import load_tasks, make_task, read_config, row_label
 from shipbench.errors import InputError
 
 
@@ -117,4 +117,33 @@ def test_a_task_without_the_newer_keys_keeps_its_key():
     rows."""
     assert load_tasks("paper")[0].key("e102babe79cc29d8") == "ea05ddf8a550"
     assert task(train_runs=8).key("data") != task().key("data")
+    assert task(train_on=["measured"]).key("data") == task().key("data")
+    paired = task(simulated="twin")
+    assert paired.key("data", "a") == task(simulated="elsewhere", train_on=["simulated"]).key("data", "a")
+    assert len({paired.key("data", "a"), paired.key("data", "b"), task().key("data")}) == 3
     assert len({task(split=s).key("data") for s in ("folds", "published", "kind", "speed", "extrapolate")}) == 5
+
+
+def test_models_are_trained_on_all_three_where_simulated_runs_are_given():
+    assert task().train_on == ("measured",)
+    assert task(simulated="twin").train_on == ("measured", "simulated", "simulated+measured")
+    assert task(simulated="twin", train_on=["simulated", "simulated"]).train_on == ("simulated",)
+    assert [row_label("mlp", choice) for choice in ("measured", "simulated")] == ["mlp", "mlp (simulated)"]
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        (
+            {"train_on": ["simulated"]},
+            "train_on: no simulated runs are given; add simulated=FOLDER, made by",
+        ),
+        ({"train_on": ["both"], "simulated": "twin"}, "'measured', 'simulated' or 'simulated\\+measured'"),
+        ({"bands": True, "simulated": "twin"}, "train_on: bands are computed for models trained on measured runs only"),
+        ({"models": ["a", "a (simulated)"], "simulated": "twin"}, "two rows would be named 'a \\(simulated\\)'"),
+        ({"models": ["a" * 995], "simulated": "twin"}, "has 1007 characters; accepted: at most 1000"),
+    ],
+)
+def test_choices_of_training_runs_that_cannot_be_are_refused(changes, message):
+    with pytest.raises(InputError, match=message):
+        task(**changes)

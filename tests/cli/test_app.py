@@ -233,6 +233,20 @@ def test_a_diagnosis_that_cannot_be_written_is_told_before_anything_is_fitted(cl
     assert "--out f cannot be made: it is a file; accepted: a folder." in result.stderr
 
 
+def test_a_twin_is_simulated_and_models_are_trained_on_it(cli, toy_folder):
+    toy_folder()
+    made = cli("data", "simulate", "hold", "--like", "toyset")
+    written, hint = made.stdout.splitlines()
+    assert written.startswith("Written: toyset-simulated (6 runs, ")
+    assert hint == "Train on it: shipbench run -m mlp --dataset toyset --simulated toyset-simulated"
+    spec = "physics[iterations=0]"
+    result = cli("run", "-m", spec, "-d", "toyset", "--simulated", "toyset-simulated", *QUICK, "--json", "--train-on",
+                 "simulated, simulated+measured")  # fmt: skip
+    assert result.exit_code == 0, result.output
+    [board] = json.loads(result.stdout)["leaderboards"].values()
+    assert sorted(board["ranking"]) == [f"{spec} (simulated)", f"{spec} (simulated+measured)"]
+
+
 def test_models_lists_names_and_parameters(cli):
     parts = {p["name"]: p for p in json.loads(cli("models", "--json").stdout)}
     assert {"hold", "physics", "mlp", "lstm", "oracle"} <= set(parts)
@@ -305,6 +319,13 @@ def test_validate_prints_every_row_and_fails_when_one_is_outside(cli, monkeypatc
             ["run", "-m", "hold", "-d", "toyset", "--horizon", "20", "--out", "wrong.toml/x"],
             "cannot write to wrong.toml/x: Not a directory",
         ),
+        (
+            ["run", "-m", "hold", "-d", "toyset", "--horizon", "20", "--simulated", "toyset"],
+            "is no twin of data set 'toyset': its states are the measured ones",
+        ),
+        (["run", "-m", "hold", "-d", "toyset", "--train-on", "simulated"], "add --simulated FOLDER"),
+        (["data", "simulate", "calibrated", "--like", "toyset"], "'calibrated' must be fitted before it can simulate"),
+        (["data", "simulate", "hold", "--like", "toyset", "--out", "toyset"], "holds the data set 'toyset'"),
         (["leaderboard"], "no results below runs/"),
         (["leaderboard", "toyset"], "toyset holds no results"),
         (["predict", "hold", "toyset"], "'hold' is not a saved model"),

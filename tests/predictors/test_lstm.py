@@ -100,3 +100,12 @@ def test_wrong_settings_and_use_before_fit_are_refused(parts):
     batch = parts[2].batch()
     with pytest.raises(InputError, match="before fit"):
         LSTM().predict(batch.s0, batch.U)
+
+
+def test_a_warm_start_goes_on_from_the_last_fit_in_its_scales(parts, model):
+    train, valid, batch = parts[0], parts[1], parts[2].batch()
+    still = LSTM(hidden=model.hidden, epochs=4, lr=1e-12)
+    still._weights, still.warm_start = dict(model._weights), True
+    still.fit(train.subset(range(4)), valid, seed=1)
+    np.testing.assert_allclose(still.predict(batch.s0, batch.U), model.predict(batch.s0, batch.U), rtol=1e-5, atol=1e-4)
+    np.testing.assert_array_equal(still._weights["scale_y.mean"], model._weights["scale_y.mean"])

@@ -115,3 +115,28 @@ def test_wrong_settings_and_use_before_fit_are_refused(parts):
         MLP(hidden=0)
     with pytest.raises(InputError, match="before fit"):
         MLP().predict(parts[2].s0, parts[2].U)
+
+
+def test_a_warm_start_goes_on_from_the_last_fit_in_its_scales(parts):
+    train, valid, batch = parts
+    first, other = train.subset(range(4)), train.subset(range(2, 12))
+    alone = [quick().fit(first, valid, seed=1), quick().fit(other, valid, seed=2)]
+    before = [model.predict(batch.s0, batch.U) for model in alone]
+    scales = [model._weights["scale_x.mean"].copy() for model in alone]
+    still = [MLP(hidden=16, epochs=1, lr=1e-12) for _ in alone]
+    for model, fitted in zip(still, alone, strict=True):
+        model._weights, model.warm_start = dict(fitted._weights), True
+        model.fit(train, valid, seed=3)
+    group = [quick().fit(first, valid, seed=1), quick().fit(other, valid, seed=2)]
+    for model in (*alone, *group):
+        model.warm_start = True
+    MLP.fit_group(group, [train, other], [valid, valid], [3, 4])
+    alone[0].fit(train, valid, seed=3)
+    alone[1].fit(other, valid, seed=4)
+    for m in range(2):
+        np.testing.assert_allclose(still[m].predict(batch.s0, batch.U), before[m], rtol=1e-6, atol=1e-6)
+        np.testing.assert_array_equal(group[m]._weights["scale_x.mean"], scales[m])
+        np.testing.assert_allclose(
+            group[m].predict(batch.s0, batch.U), alone[m].predict(batch.s0, batch.U), rtol=1e-3, atol=1e-2
+        )
+        assert not np.allclose(alone[m].predict(batch.s0, batch.U), before[m], atol=1e-2)

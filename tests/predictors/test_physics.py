@@ -10,6 +10,7 @@ import pytest
 from shipbench.estimation.actuator_fit import DEFAULT_ACTUATORS, fit_actuators
 from shipbench.physics import eq2
 from shipbench.physics.actuators import lag_with_rate_limit
+from shipbench.predictors.hold import Hold
 from shipbench.predictors.physics import Physics
 from shipbench.records import Batch, Dataset, Run
 from shipbench.ship import complete
@@ -234,3 +235,14 @@ def test_rolling_is_the_same_model_as_the_formula_step_by_step(harbour, fitted, 
         )
         slope = (up - down)[..., :6] / (2.0 * step[i])
         np.testing.assert_allclose(slopes[..., i], slope, atol=1e-4 * np.abs(slope).max() + 1e-9)
+
+
+def test_the_particulars_alone_make_an_ordinary_ship_and_no_run_changes_it(harbour):
+    batch = harbour.batch()
+    model = Physics().of_particulars(harbour)
+    S = model.predict(batch.s0, batch.U)
+    np.testing.assert_array_equal(Physics().of_particulars(harbour[:1]).predict(batch.s0, batch.U), S)
+    hold = Hold.at(harbour.dt).predict(batch.s0, batch.U)
+    error, floor = (np.hypot(*(P - batch.truth)[..., :2].T).mean() for P in (S, hold))
+    assert error < 0.8 * floor
+    assert model.p[[0, 3, 4, 6, 9]].tolist() == [0.0] * 5
