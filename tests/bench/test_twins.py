@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -268,7 +269,7 @@ def test_resume_keeps_the_cells_of_the_same_twin_only(study, trial):
 
 
 def test_benchmark_takes_a_twin_in_memory_or_its_folder(trial, twin, tmp_path):
-    options = {"horizon": 20, "folds": 2, "quiet": True}
+    options: dict[str, Any] = {"horizon": 20, "folds": 2, "quiet": True}
     scores = sb.benchmark([Seen(), "hold"], trial, simulated=twin, **options)
     assert set(scores.results.rows["model"]) == {"hold", *("Seen", "Seen (simulated)", "Seen (simulated+measured)")}
     sb.simulate_like(turn, trial, out=tmp_path / "twin")
