@@ -73,8 +73,8 @@ def _ready(spec: Spec, data: Dataset, device: str | None) -> Any:
     if learns(spec, model):
         raise InputError(
             f"model '{spec.text}' must be fitted before it can simulate. Accepted: a saved model, a simulator "
-            "(sim.py:simulate, or a class with learns = False), ship.fmu, oracle, or physics. Fit it with `shipbench run` on other trials, and give "
-            "cells/<dataset>/<model>/fold0-seed0/model."
+            "(sim.py:simulate, or a class with learns = False), ship.fmu, oracle, or physics. Fit it with "
+            "`shipbench run` on other trials, and give cells/<dataset>/<model>/fold0-seed0/model."
         )
     refusal = getattr(model, "skip", None)
     if callable(refusal) and (why := refusal(data)):

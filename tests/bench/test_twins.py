@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
@@ -47,7 +47,7 @@ class Seen:
     """Holds the state; notes every fit in `fits`, a list that copies share by being the class's own."""
 
     learns: bool = True
-    fits = []  # noqa: RUF012 - shared on purpose
+    fits: ClassVar[list[Any]] = []
 
     def fit(self, train, valid=None, *, seed=0):
         self.fits.append((self, getattr(self, "warm_start", None), train, valid))
@@ -91,7 +91,6 @@ def study(trial, twin, tmp_path):
         memory = Memory({"toy": trial, twin.name: twin}, {k: s for k, s in specs.items() if s.given is not None})
         return run_tasks([make_task({**own, **task})], tmp_path / out, resume=resume, memory=memory)
 
-    run.fits, run.out = Seen.fits, tmp_path / "out"
     return run
 
 
@@ -199,7 +198,7 @@ def test_a_wrong_twin_is_one_message(trial, twin):
 def test_a_wrong_twin_stops_the_study_before_anything_is_fitted(study, twin):
     with pytest.raises(InputError, match="is no twin of data set 'toy': it lacks"):
         study(Seen(), twin=twin[:5])
-    assert not study.fits
+    assert not Seen.fits
 
 
 def test_twins_of_training_runs_train_and_no_twin_of_a_scored_run_does(study, trial, twin):
@@ -207,7 +206,7 @@ def test_twins_of_training_runs_train_and_no_twin_of_a_scored_run_does(study, tr
     assert [(s["model"], s["train_on"]) for s in outcome.summaries[::3]] == [
         ("Seen", "measured"), ("Seen (simulated)", "simulated"), ("Seen (simulated+measured)", "simulated+measured"),
     ]  # fmt: skip
-    for summary, (_, _, train, valid) in zip(outcome.summaries, study.fits, strict=True):
+    for summary, (_, _, train, valid) in zip(outcome.summaries, Seen.fits, strict=True):
         runs, scored = summary["runs"], set(summary["runs"]["test"])
         groups = {trial[i].group for i in scored}
         assert not {run.parent for run in (*train, *valid)} & scored
@@ -224,9 +223,9 @@ def test_twins_of_training_runs_train_and_no_twin_of_a_scored_run_does(study, tr
 def test_a_model_with_a_warm_start_is_trained_on_the_twins_first(study, trial, twin, kind):
     outcome = study(kind, train_on=["simulated+measured"])
     assert not outcome.failed
-    assert len(study.fits) == 6
+    assert len(Seen.fits) == 6
     by_model: dict[int, list] = {}
-    for fit in study.fits:
+    for fit in Seen.fits:
         by_model.setdefault(id(fit[0]), []).append(fit)
     assert len(by_model) == 3
     for first, second in by_model.values():
@@ -248,23 +247,25 @@ def test_a_model_that_learns_nothing_has_one_row(study):
 
 
 def test_results_are_read_back_verified_and_not_mixed_with_those_of_another_twin(study, trial, tmp_path):
+    out = tmp_path / "out"
     outcome = study("hold", "physics[iterations=0]", train_on=["measured", "simulated"])
-    back = read_results([study.out])
+    back = read_results([out])
     assert set(back.rows["model"]) == {"hold", "physics[iterations=0]", "physics[iterations=0] (simulated)"}
     assert verify(back)[0] == []
     assert {s["simulated"]["fingerprint"] for s in outcome.summaries} == {simulate_like(turn, trial).fingerprint}
     study("physics[iterations=1]", twin=simulate_like("hold", trial), train_on=["simulated"], out="other")
     with pytest.raises(InputError, match="different tasks"):
-        build_board(read_results([study.out, tmp_path / "other"]), "toy")
+        build_board(read_results([out, tmp_path / "other"]), "toy")
 
 
-def test_resume_keeps_the_cells_of_the_same_twin_only(study, trial):
+def test_resume_keeps_the_cells_of_the_same_twin_only(study, trial, tmp_path):
+    out = tmp_path / "out"
     study("hold", "physics[iterations=0]", train_on=["simulated"])
-    before = {p: p.stat().st_mtime_ns for p in study.out.glob("cells/*/*/*/summary.json")}
+    before = {p: p.stat().st_mtime_ns for p in out.glob("cells/*/*/*/summary.json")}
     study("hold", "physics[iterations=0]", train_on=["simulated"], resume=True)
-    assert {p: p.stat().st_mtime_ns for p in study.out.glob("cells/*/*/*/summary.json")} == before
+    assert {p: p.stat().st_mtime_ns for p in out.glob("cells/*/*/*/summary.json")} == before
     study("hold", "physics[iterations=0]", train_on=["simulated"], resume=True, twin=simulate_like("hold", trial))
-    after = {p: p.stat().st_mtime_ns for p in study.out.glob("cells/*/*/*/summary.json")}
+    after = {p: p.stat().st_mtime_ns for p in out.glob("cells/*/*/*/summary.json")}
     assert all(after[p] > before[p] for p in before)
 
 
