@@ -69,10 +69,11 @@ def export(folder: str, format: str, out: Path | None = None, *, fmi: int = 2, f
         write: Any = kind.write
         write(step, name, path, **({"fmi": fmi} if format == "fmu" else {}))
         return path
-    fresh = path.with_name(f".{path.name}.new")
+    place = path.resolve()
+    fresh = place.with_name(f".{place.name}.new")
     try:
         kind.write(step, name, fresh)
-        exchange(fresh, path)
+        exchange(fresh, place)
     finally:
         shutil.rmtree(fresh, ignore_errors=True)
     return path

@@ -30,6 +30,8 @@ TOLERANCE = 1e-9
 """Largest difference from `predict` of an exported number, relative to max(1, its size)."""
 _SAMPLES = 60
 """Steps of the reference trajectory."""
+_MOST_SUBSTEPS, _MOST_DELAYED = 50, 1000
+"""Most integration steps a sample, and most samples of a delay: they bound the size of what is written."""
 
 
 @dataclass(frozen=True)
@@ -95,6 +97,7 @@ def step_of(model: FittedShip) -> Step:
         InputError: the model has an effect that no step can hold.
         WorkError: the model diverges, or its step does not give the numbers of `predict`.
     """
+    _check_size(model)
     made = _traced(model)
     reference = made.reference
     if not np.isfinite(reference.S).all():
@@ -110,6 +113,20 @@ def step_of(model: FittedShip) -> Step:
             f"{TOLERANCE:g}), so that nothing was exported. Please report this model."
         )
     return made
+
+
+def _check_size(model: FittedShip) -> None:
+    """Refuse a model whose inputs or sample time no step can hold."""
+    if model.inputs[: len(COMMANDS)] != COMMANDS:
+        raise InputError(
+            f"the model's inputs are {', '.join(model.inputs)}; accepted: {', '.join(COMMANDS)}, then measured "
+            "channels. Fit it on a data set in shipbench's format."
+        )
+    if model.substeps > _MOST_SUBSTEPS:
+        raise InputError(
+            f"the model's sample time {model.dt:g} s is {model.substeps} integration steps of a ship of "
+            f"{model.c.L:.3g} m; accepted: up to {_MOST_SUBSTEPS}. Fit it on data with a shorter sample time."
+        )
 
 
 def _traced(model: FittedShip) -> Step:
@@ -187,11 +204,11 @@ class _Line:
         self.name, self.parts, self.gear, self.held, self.late = name, parts, gear, 0, (0, 0.0)
         channels = []
         if gear is not None:
-            if gear.delay < 0.0:
+            if not 0.0 <= gear.delay <= _MOST_DELAYED * dt:
                 raise InputError(
-                    f"the model cannot be exported: its {name} follows commands {-gear.delay:.3g} s before they are "
-                    "given (a negative delay), which a step does not know. Accepted: delays from 0 s. Fit the model "
-                    "without the delay."
+                    f"the model cannot be exported: its {name} follows commands with a delay of {gear.delay:.3g} s. A "
+                    f"step knows no command before it is given; accepted: delays from 0 to {_MOST_DELAYED * dt:g} s. "
+                    "Fit the model without the delay."
                 )
             part = dt / parts
             whole = math.floor(gear.delay / part)
@@ -311,5 +328,4 @@ def _manoeuvre(model: FittedShip) -> tuple[np.ndarray, np.ndarray]:
     U = np.zeros((_SAMPLES, len(model.inputs)))
     for i, name in enumerate(model.inputs):
         U[:, i] = columns.get(name, constant.get(name, 0.0))
-    assert model.inputs[: len(COMMANDS)] == COMMANDS
     return s0, U

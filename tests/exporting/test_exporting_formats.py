@@ -51,6 +51,11 @@ def test_what_is_there_stays_without_force(saved, place, format):
     assert sorted(p.name for p in place.rglob("*")) == before
 
 
+def test_c_may_fill_an_empty_folder(saved, place):
+    shipbench.export_model(saved("physics"), "c", ".")
+    assert {p.name for p in place.iterdir()} == {"model.c", "model.h", "test.c", "README.txt"}
+
+
 def test_force_replaces_nothing_of_another_kind(saved, place):
     folder = saved("physics")
     Path("notes").mkdir()

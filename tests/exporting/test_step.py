@@ -64,9 +64,23 @@ def test_a_late_sensor_is_refused(made, effect):
         step_of(made(f"physics+{effect}"))
 
 
-def test_a_command_known_in_advance_is_refused(made):
-    with pytest.raises(InputError, match=r"delta follows commands 1.5 s before they are given"):
-        step_of(made("physics+rudder_delay[delay=-1.5]"))
+@pytest.mark.parametrize(("delay", "told"), [(-1.5, "-1.5"), (1e7, "1e[+]07"), (float("nan"), "nan")])
+def test_a_delay_that_no_step_can_hold_is_refused(made, delay, told):
+    model = made("physics+rudder_delay[delay=1]")
+    model.extension.values = [(delay,)]
+    with pytest.raises(InputError, match=f"its delta follows commands with a delay of {told} s.*from 0 to 1000 s"):
+        step_of(model)
+
+
+def test_inputs_and_sample_times_that_no_step_can_hold_are_refused(made):
+    model = made("physics")
+    model.substeps = 51
+    with pytest.raises(InputError, match="is 51 integration steps of a ship of 130 m; accepted: up to 50"):
+        step_of(model)
+    model = made("physics")
+    model.inputs = ("delta_c", "n_c", "F_b_c", "F_s_c")
+    with pytest.raises(InputError, match="inputs are delta_c, n_c"):
+        step_of(model)
 
 
 def test_a_formula_that_takes_no_symbols_is_one_message(made, monkeypatch):
