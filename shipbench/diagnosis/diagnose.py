@@ -28,6 +28,7 @@ from ..steps import step, within
 from .candidates import describe_candidates
 from .evaluation.held_out_gain import FoldErrors, fold_errors, of_runs, on_fitted_runs, summarise
 from .evaluation.moved import moved
+from .evaluation.noise_floor import noise_floor
 from .evaluation.residuals import what_is_wrong
 from .evaluation.series import trace_of
 from .explain import describe_causes, remaining, unknown_part, what_is_left
@@ -137,7 +138,8 @@ def _diagnosed(
     verdict = "unknown" if unknown else "found" if causes else "none"
     own = worth.calibration or (on_fitted_runs(dataset, found.selection.null, seed) if rests else None)
     if own is not None:
-        own = replace(own, moved=moved(found.selection.null if unknown else found.final, causes))
+        floor = noise_floor(dataset, found.selection.null, seed)
+        own = replace(own, moved=moved(found.selection.null if unknown else found.final, causes), noise_floor=floor)
     gained = worth.own if worth.hull and len(causes) == 1 else worth.gain
     proposed = _proposed([c.effect for c in causes if c.effect not in behind], own)
     return Diagnosis(

@@ -35,12 +35,22 @@ class Moved:
 
 
 @dataclass(frozen=True)
+class NoiseFloor:
+    """Mean errors of position [m] and heading [rad] that the sensors' noise alone makes in open-loop rollouts: at their
+    beginning, which a model that is not stable enlarges, and in the record that they are compared with."""
+
+    position: float
+    heading: float
+
+
+@dataclass(frozen=True)
 class Calibrated:
     """Mean position error ED [m] of open-loop rollouts: `before`, of the ship file's model, and `after`, with the
     ship's own coefficients calibrated.
 
     ci95: interval of `after` over runs. seconds: longest rollout. held_out: whether every run was predicted by a model
-    that was fitted to others. moved: quantities of the calibrated ship that differ from those of her file.
+    that was fitted to others. moved: quantities of the calibrated ship that differ from those of her file. noise_floor:
+    the part of both errors that the sensors' noise makes.
     """
 
     before: float
@@ -49,6 +59,7 @@ class Calibrated:
     seconds: float
     held_out: bool
     moved: tuple[Moved, ...] = ()
+    noise_floor: NoiseFloor | None = None
 
 
 @dataclass(frozen=True)

@@ -103,8 +103,9 @@ def _error(d: Diagnosis) -> Tile:
         values, names = [*(values or [d.gain.before]), d.gain.after], [*(names or ["calibrated"]), "with the causes"]
     if values:
         share = f": {gain_share(d.gain)}" if d.gain is not None else ""
+        floor = f"; noise floor {figure(own.noise_floor.position, 2)} m" if own and own.noise_floor else ""
         shown = " to ".join(f"{figure(v)} m" for v in values)
-        return Tile("Held-out position error", shown, f"{', '.join(names)}{share}")
+        return Tile("Held-out position error", shown, f"{', '.join(names)}{share}{floor}")
     if d.trace is None:
         return Tile("Held-out position error", "not measured")
     errors = [position_errors(d.trace, p) for p in rollouts(d.trace, changed(d))]

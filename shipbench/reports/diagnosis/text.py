@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import shlex
 
-from ...diagnosis.result import Candidate, Cause, Diagnosis, Estimate, Gain, what_it_is
+from ...diagnosis.result import Candidate, Cause, Diagnosis, Estimate, Gain, NoiseFloor, what_it_is
 from ...effects.base import EFFECTS, Effect, Parameter
 from ...render.table import display_unit
 from ...render.terminal import command_lines, paragraph
@@ -201,11 +201,20 @@ def calibration_words(d: Diagnosis) -> str:
         f"In open-loop rollouts of at most {c.seconds:.0f} s on {where}, the ship file's model is {figure(c.before)} m "
         f"off on average. With the ship's own coefficients calibrated it is {figure(c.after)} m off "
         f"(95 %: {figure(c.ci95[0], 2)} to {figure(c.ci95[1], 2)} m)."
+        + (f" {floor_words(c.noise_floor)}" if c.noise_floor is not None else "")
         + "".join(
             f" The calibrated ship's {m.coefficient} is {_changed(m.change)} than the ship file's "
             f"(95 %: {_between(*m.ci95, 'smaller', 'larger')})."
             for m in c.moved
         )
+    )
+
+
+def floor_words(floor: NoiseFloor) -> str:
+    """Errors that the noise of the sensors alone makes in these rollouts."""
+    return (
+        f"The noise of the sensors alone makes {figure(floor.position, 2)} m and "
+        f"{figure(math.degrees(floor.heading), 2)}° of heading (noise floor)."
     )
 
 

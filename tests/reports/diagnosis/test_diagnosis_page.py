@@ -14,7 +14,7 @@ from made_diagnosis import CANDIDATES, CAUSE, GAIN, extended, make_diagnosis, ma
 from typer.testing import CliRunner
 
 from shipbench.cli.app import app
-from shipbench.diagnosis.result import Calibrated, Candidate, Diagnosis, Estimate, Gain, Moved
+from shipbench.diagnosis.result import Calibrated, Candidate, Diagnosis, Estimate, Gain, Moved, NoiseFloor
 from shipbench.reports.diagnosis.files import write_diagnosis, write_report
 from shipbench.reports.diagnosis.linked import changed, chosen_segments, fits, position_errors
 from shipbench.reports.diagnosis.page import diagnosis_page as page
@@ -66,7 +66,11 @@ def test_the_document_has_the_contracts_keys_and_no_nan(tmp_path):
     assert in_words(replace(make_diagnosis(), calibration=own)).document()["calibration"] == {
         "metric": "ED", "on": "held-out runs", "before": 15.7, "after": 0.467, "ci95": [0.25, 0.83], "seconds": 120.0,
         "moved": [{"coefficient": "yaw rate", "change": 0.444, "unit": "1", "ci95": [0.4, 0.493], "spreads": 0.7}],
+        "noise_floor": None,
     }  # fmt: skip
+    floored = replace(own, noise_floor=NoiseFloor(0.31, 0.0123456789))
+    written = in_words(replace(make_diagnosis(), calibration=floored)).document()["calibration"]
+    assert written["noise_floor"] == {"position": 0.31, "heading": 0.0123457}
     assert document["schema"] == 1
     cause = document["causes"][0]
     assert cause["parameters"]["speed"] == {"value": 0.31, "unit": "m/s", "ci95": [0.28, 0.34]}

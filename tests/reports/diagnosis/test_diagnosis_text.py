@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 from made_diagnosis import CAUSE, GAIN, make_diagnosis
 
-from shipbench.diagnosis.result import Calibrated, Cause, Estimate, Moved
+from shipbench.diagnosis.result import Calibrated, Cause, Estimate, Moved, NoiseFloor
 from shipbench.effects.base import EFFECTS
 from shipbench.reports.diagnosis.text import (
     calibration_words,
@@ -128,6 +128,10 @@ def test_the_errors_of_ship_file_and_calibrated_ship_are_always_stated(held_out,
     text = " ".join(" ".join(summary_lines(replace(make_diagnosis("none"), calibration=own))).split())
     assert f"rollouts of at most 120 s on {where}, the ship file's model is 15.7 m off on average" in text
     assert "it is 0.467 m off (95 %: 0.25 to 0.83 m)" in text
+    assert "noise floor" not in text
+    floored = replace(own, noise_floor=NoiseFloor(0.31, 0.01))
+    text = calibration_words(replace(make_diagnosis("none"), calibration=floored))
+    assert "The noise of the sensors alone makes 0.31 m and 0.57° of heading (noise floor)." in text
     assert (
         "yaw rate with 10° of rudder at 110 rpm is 44 % larger than the ship file's (95 %: 40 to 49 % larger)" in text
     )
