@@ -310,22 +310,19 @@ STATE_CHANNELS = tuple(Channel(name, UNITS[name], _MEANING[name]) for name in ST
 
 
 def _manoeuvre(model: FittedShip) -> tuple[np.ndarray, np.ndarray]:
-    """Start state (10,) and inputs (K, inputs): a zigzag at moderate speed with a push of each thruster and turning
-    wind."""
+    """Start state (10,) and inputs (K, inputs): a zigzag at moderate speed with a push of each thruster and a wind that
+    rises and turns. It begins straight ahead in calm air: an FMU starts with these values."""
     L, D = model.c.L, model.c.D_P
     speed = float(f"{0.12 * math.sqrt(9.81 * L):.3g}")
     n = float(f"{60.0 * speed / (0.7 * D):.3g}")
     push = float(f"{2e-4 * 9.81 * model.particulars.mass:.2g}")
-    s0 = np.array([0.0, 0.0, 0.5, speed, 0.02 * speed, 0.0, n, 0.0, 0.0, 0.0])
+    s0 = np.array([0.0, 0.0, 0.0, speed, 0.0, 0.0, n, 0.0, 0.0, 0.0])
     part = np.linspace(0.0, 1.0, _SAMPLES, endpoint=False)
     zigzag = np.where(part < 0.15, 0.0, np.where(part < 0.4, 0.2, np.where(part < 0.7, -0.3, 0.1)))
     columns = {
         "n_c": n * np.where(part < 0.6, 1.0, 0.6), "delta_c": zigzag,
         "F_b_c": push * (part > 0.5), "F_s_c": 0.0 - 0.5 * push * (part > 0.8),
-        "wind_speed": 6.0 + 2.0 * part, "wind_from": 1.0 + 0.5 * part,
+        "wind_speed": 3.0 * speed * part, "wind_from": 2.0 * part,
+        "depth": np.full(_SAMPLES, round(10.0 * model.c.T, 1)),
     }  # fmt: skip
-    constant = {"depth": round(3.0 * model.c.T, 1)}
-    U = np.zeros((_SAMPLES, len(model.inputs)))
-    for i, name in enumerate(model.inputs):
-        U[:, i] = columns.get(name, constant.get(name, 0.0))
-    return s0, U
+    return s0, np.stack([columns.get(name, np.zeros(_SAMPLES)) for name in model.inputs], axis=1)
