@@ -295,8 +295,8 @@ def _complete_pairs(found: Assigned, kept: dict[str, Any]) -> None:
         if m in ("north velocity", "east velocity") and c.name not in found.used()
     ]:
         found.notes.append(
-            f"{', '.join(speeds)} are velocities in earth axes and not taken; u and v come from the track, or map "
-            "them after turning."
+            f"{', '.join(speeds)} are velocities in earth axes and not taken; u and v come from the track. To take "
+            'them, map them as u and v, and write velocities = "earth" into dataset.toml.'
         )
     psi, x = found.entries.get("psi"), found.entries.get("x")
     if (

@@ -50,6 +50,11 @@ def identify(columns: Sequence[Column], t: np.ndarray, found: Assigned) -> None:
     found.notes.append(
         f"NOT SURE: the columns have no heads; taken as {told}: only so heading, yaw rate, track and speeds agree."
     )
+    if earth := [f"'{free[k].name}'" for k in _in_earth_axes(motion, places)]:
+        found.notes.append(
+            f"{' and '.join(earth)} are velocities in earth axes and not taken; u and v come from the track. To take "
+            'them, map them as u and v, and write velocities = "earth" into dataset.toml.'
+        )
     found.notes.append(
         "NOT SURE: x is taken as north. A log with x east and angles counter-clockwise would look the same."
     )
@@ -103,15 +108,12 @@ def _track(motion: _Motion, heading: np.ndarray, x: int, y: int) -> tuple[float,
         return None
     units: dict[str, str] = {}
     places: dict[str, int] = {}
-    score, least = 0.0, THRESHOLDS.value("headless_correlation")
-    for channel, wanted in (("v", sway), ("u", surge)):
+    score = 0.0
+    for channel, wanted, along_axis in (("v", sway, east), ("u", surge, north)):
         for k in range(len(motion.means)):
-            fit = _line(motion.means[k], wanted)
-            unit = next(
-                (u for u in ("m/s", "kn") if fit and fit[1] > least and _is_unit(fit[0], unit_factor("u", u))),
-                None,
-            )
-            if fit and unit and k not in (x, y):
+            fit, unit = _speed(motion.means[k], wanted)
+            earth = _speed(motion.means[k], along_axis)[0]
+            if fit and unit and k not in (x, y) and not (earth and earth[1] > fit[1]):
                 units[channel], places[channel] = unit, k
                 score += fit[1]
                 break
@@ -121,6 +123,22 @@ def _track(motion: _Motion, heading: np.ndarray, x: int, y: int) -> tuple[float,
     if "v" not in places and followed < THRESHOLDS.value("headless_followed"):
         return None
     return score + followed, units, places
+
+
+def _speed(column: np.ndarray, wanted: np.ndarray) -> tuple[tuple[float, float] | None, str | None]:
+    """Line of a velocity `wanted` over a column, and the unit in which the column is that velocity."""
+    fit, least = _line(column, wanted), THRESHOLDS.value("headless_correlation")
+    units = (u for u in ("m/s", "kn") if fit and fit[1] > least and _is_unit(fit[0], unit_factor("u", u)))
+    return fit, next(units, None)
+
+
+def _in_earth_axes(motion: _Motion, places: dict[str, int]) -> list[int]:
+    """Columns of velocities to the north and to the east, where both are there and no channel."""
+    rest = [k for k in range(len(motion.means)) if k not in places.values()]
+    found = [
+        next((k for k in rest if _speed(motion.means[k], motion.changes[places[axis]])[1]), None) for axis in ("x", "y")
+    ]
+    return [k for k in found if k is not None] if None not in found else []
 
 
 def _line(of: np.ndarray, wanted: np.ndarray) -> tuple[float, float] | None:

@@ -288,6 +288,17 @@ def test_columns_without_heads_are_known_by_the_motion(propose, tmp_path, order)
     np.testing.assert_allclose(run.states[:, 4], motion(run.t)["v"], atol=0.01)
 
 
+def test_earth_fixed_velocities_without_heads_are_no_surge_and_sway(propose, tmp_path):
+    t = np.arange(0.0, 240.0)
+    table = logged(t)[["time", "north", "east", "HDG", "surge", "sway", "ROT"]]
+    c, s = np.cos(np.deg2rad(table["HDG"])), np.sin(np.deg2rad(table["HDG"]))
+    table["surge"], table["sway"] = table["surge"] * c - table["sway"] * s, table["surge"] * s + table["sway"] * c
+    done, _, plan = propose(write(tmp_path, "log.csv", table.to_csv(index=False, header=False).encode()))
+    assert set(plan["channels"]) == {"x", "y", "psi", "r"}
+    assert "'5' and '6' are velocities in earth axes and not taken" in " ".join(done.stdout.split())
+    assert 'velocities = "earth"' in done.stdout
+
+
 def test_columns_without_heads_are_not_guessed_where_the_ship_does_not_turn(propose, tmp_path):
     t = np.arange(0.0, 240.0)
     table = pd.DataFrame(
