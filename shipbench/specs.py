@@ -41,6 +41,7 @@ class Spec:
 
     given: the class, object or function of a model in memory, which `name` and `text` only label.
     reader: name of the predictor that is made of the file or folder `path`; "" for a saved model and for a class.
+    matched: content of `path` after it was read and matched to the runs of a data set, where the reader needs them.
     """
 
     text: str
@@ -51,6 +52,7 @@ class Spec:
     class_name: str | None = None
     given: Any = None
     reader: str = ""
+    matched: Any = field(default=None, compare=False, repr=False)
 
     def __repr__(self) -> str:
         return brief(f"<Spec {self.text}>")

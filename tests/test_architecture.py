@@ -45,6 +45,7 @@ HOUSE: dict[float, dict[str, str]] = {
     4: {"data": "data sets, files, corrections"},
     4.3: {"importing": "logs into data sets"},
     4.5: {"checking": "one fault of measured data a file"},
+    4.6: {"replay": "trajectories predicted elsewhere: reading, matching to runs, frames"},
     4.7: {"diagnosis": "what the physics lacks: preparation, selection, actuators, evaluation"},
     4.8: {"contract": "rules of a predictor"},
     5: {"bench": "running a study: task, folds, work, executors, scoring, results"},

@@ -13,6 +13,7 @@ from shipbench.checking.thresholds import THRESHOLDS as CHECKING
 from shipbench.diagnosis.thresholds import THRESHOLDS
 from shipbench.estimation.thresholds import THRESHOLDS as ESTIMATION
 from shipbench.importing.thresholds import THRESHOLDS as IMPORTING
+from shipbench.replay.thresholds import THRESHOLDS as REPLAY
 from shipbench.suites.checks.clean_sets import base_set
 from shipbench.suites.checks.faults import FAULTS
 from shipbench.suites.checks.suite import write_planted
@@ -24,7 +25,13 @@ ANCHORS = {
     for line in (ROOT / "docs" / "calibration.md").read_text("utf-8").splitlines()
     if line.startswith("#")
 }
-TABLES = {"checking": CHECKING, "diagnosis": THRESHOLDS, "estimation": ESTIMATION, "importing": IMPORTING}
+TABLES = {
+    "checking": CHECKING,
+    "diagnosis": THRESHOLDS,
+    "estimation": ESTIMATION,
+    "importing": IMPORTING,
+    "replay": REPLAY,
+}
 MOST = {"checking": 50, "diagnosis": 80}
 """Rows of a table at most: a new number takes the place of another one, or is one that stands already."""
 

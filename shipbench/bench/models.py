@@ -11,6 +11,7 @@ from ..predictors._saved import Origin, read_meta
 from ..predictors._user_file import code_of
 from ..predictors.base import PREDICTORS, make_predictor
 from ..registry import package_digest, reason
+from ..replay.reading import files_of
 from ..specs import Spec
 from .isolate import call_isolated
 from .provenance import source_digest
@@ -129,6 +130,8 @@ def _made(spec: Spec) -> _Made | ShipbenchError:
 def _files(spec: Spec) -> dict[str, bytes]:
     if spec.path is None:
         return {}
+    if spec.reader == "predictions":
+        return {path.as_posix(): path.read_bytes() for path in files_of(spec.path, str(spec.params.get("mapping", "")))}
     if spec.class_name is not None:
         return code_of(spec.path)
     if spec.path.is_file():

@@ -37,9 +37,15 @@ PROTOCOL = 1
 protocols are never ranked together."""
 
 STATUSES = ("ok", "diverged", "failed", "skipped")
+"""Statuses of a row. `skipped`: the model does not predict the window, by what it is."""
 _MOST_ROWS = 10_000_000
 """Most rows of a table of results; 200 models on 10,000 runs have 2 million."""
 _WHOLE = "Give the folder that `shipbench run` wrote, whole."
+
+
+def whole_status(statuses: Sequence[str]) -> str:
+    """Status of a cell from those of its rows: that of all, else "diverged" where one is, else "ok"."""
+    return statuses[0] if len(set(statuses)) == 1 else "diverged" if "diverged" in statuses else "ok"
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ from ..errors import InputError
 from ..names import brief
 from ..predictors._saved import check_origin
 from ..records import Dataset
+from ..replay.bind import bound
 from ..specs import Spec, parse_spec
 from ..steps import listening
 from ..storage import Frame, write_json
@@ -28,7 +29,7 @@ from .models import facts_of
 from .patience import Patience
 from .progress import Progress, Silent
 from .provenance import code_version, machine
-from .results import PROTOCOL, Cell, assemble, scored_before, write_cell, write_truth
+from .results import PROTOCOL, Cell, assemble, scored_before, whole_status, write_cell, write_truth
 from .scoring import columns, divergence, measure
 from .study import Part, Study
 from .submissions import Results
@@ -154,7 +155,9 @@ def _prepare(task: Task, memory: Memory) -> Study:
     facts = [
         facts_of(spec) for spec in specs
     ]  # an unknown model or parameter is told before anything is loaded or fitted
-    data, notes = select_runs(memory.data.get(task.dataset) or load_dataset(task.dataset), task)
+    whole = memory.data.get(task.dataset) or load_dataset(task.dataset)
+    specs = [bound(spec, whole) for spec in specs]
+    data, notes = select_runs(whole, task)
     notes += tuple(
         note for spec, known in zip(specs, facts, strict=True) for note in check_origin(spec.text, known.origin, data)
     )
@@ -263,12 +266,18 @@ def _score(study: Study, spec: Spec, cell: Cell, answer: Answer) -> _Record:
         statuses, reasons = [status] * len(batch.ids), [reason] * len(batch.ids)
         values = {c["name"]: np.full(len(batch.ids), np.nan) for c in study.columns}
     else:
-        reasons = divergence(batch.truth, S, data.dt)
-        statuses = ["diverged" if r else "ok" for r in reasons]
-        ok = np.array([not r for r in reasons])
+        left_out = answer.skipped or ("",) * len(batch.ids)
+        diverged = divergence(batch.truth, S, data.dt)
+        reasons = [skipped or far for skipped, far in zip(left_out, diverged, strict=True)]
+        statuses = [
+            "skipped" if skipped else "diverged" if far else "ok"
+            for skipped, far in zip(left_out, diverged, strict=True)
+        ]
+        ok = np.array([s == "ok" for s in statuses])
         values = measure(task.metrics, batch, S, L=data.ship.L, dt=data.dt, ok=ok, W=answer.W)
-        status = "diverged" if any(reasons) else "ok"
-        reason = next((f"run {i}: {r}" for i, r in zip(batch.ids, reasons, strict=True) if r), "")
+        status = whole_status(statuses)
+        first = next((i for i, s in enumerate(statuses) if s == status != "ok"), None)
+        reason = "" if first is None else f"run {batch.ids[first]}: {reasons[first]}"
     times = {"fit_s": answer.fit_s, "fit_shared_by": answer.shared_by, "predict_s": answer.predict_s}
     rows = _rows(study, cell, statuses, reasons, values, times)
     outcome = {"status": status, "reason": reason, "run_status": statuses, "machine": answer.machine, **answer.notes}
@@ -328,6 +337,8 @@ def _outcome_text(summary: dict[str, Any]) -> str:
     statuses = summary["run_status"]
     shared = f" (its share of {summary['fit_shared_by']} fits together)" if summary["fit_shared_by"] > 1 else ""
     if summary["status"] == "ok":
-        return f"ok, {len(statuses)} runs, fit {summary['fit_s']:.2f} s{shared}"
+        skipped = statuses.count("skipped")
+        runs = f"{len(statuses) - skipped} of {len(statuses)} runs" if skipped else f"{len(statuses)} runs"
+        return f"ok, {runs}, fit {summary['fit_s']:.2f} s{shared}"
     count = sum(s == summary["status"] for s in statuses)
     return f"{summary['status']}, {count} of {len(statuses)} runs: {summary['reason']}"

@@ -140,8 +140,9 @@ class Part:
     def job(self, send_files: bool, device: str | None) -> Job:
         """Job for a worker, without `fold_data`."""
         facts = self.facts
+        files = facts.files if send_files and self.spec.matched is None else None
         return Job(
-            self.spec, self.cells[0].seed, facts.code, facts.files if send_files else None, device, facts.foreign,
+            self.spec, self.cells[0].seed, facts.code, files, device, facts.foreign,
             self.study.task.bands,
         )  # fmt: skip
 

@@ -25,7 +25,7 @@ from .entry import (
     check_task_of,
     check_windows,
 )
-from .results import PROTOCOL, Cell, read_frame, truth_path, window_table
+from .results import PROTOCOL, Cell, read_frame, truth_path, whole_status, window_table
 from .task import make_task
 
 _CELL = ["dataset", "model", "fold", "seed"]
@@ -134,8 +134,8 @@ def _check_cell(summary: dict[str, Any], part: Frame, scores: Iterable[str], ref
     statuses = part["status"].tolist()
     if statuses != summary["run_status"]:
         raise refuse(f"{label}: the statuses of the rows are not those of run_status in summary.json")
-    whole = statuses[0] if statuses[0] in ("failed", "skipped") else "diverged" if "diverged" in statuses else "ok"
-    if whole != summary["status"] or (whole in ("failed", "skipped") and len(set(statuses)) > 1):
+    whole = whole_status(statuses)
+    if whole != summary["status"] or ("failed" in statuses and whole != "failed"):
         raise refuse(f"{label}: status is '{summary['status']}' in summary.json; its rows make it '{whole}'")
     for name in (*TIMES, "fit_shared_by"):
         if (part[name] != summary[name]).any():

@@ -27,6 +27,7 @@ from ..predictors._user_file import code_of, files_read, on_import_path
 from ..predictors.base import History, make_predictor
 from ..predictors.context import Context, predicted
 from ..predictors.physics_model.fit_report import FitReport
+from ..predictors.predictions import ReplayReport
 from ..records import Dataset
 from ..signals import MOTION
 from ..specs import Spec
@@ -86,6 +87,7 @@ class Answer:
 
     Args:
         status: "" (predicted, to be scored), "failed" or "skipped", with the `reason`.
+        skipped: reason for each row (batch,) why it was not predicted, "" where it was; () where all rows were.
         S: prediction (batch, K, 10), or None.
         W: half-widths (batch, K, 6) of the 90 % band about the motion of S; NaN where there is no band. None where the
             job asks for none.
@@ -114,6 +116,7 @@ class Answer:
     machine: dict[str, Any] = field(default_factory=machine)
     code: dict[str, str] = field(default_factory=dict)
     W: np.ndarray | None = None
+    skipped: tuple[str, ...] = ()
 
 
 def work(job: Job, folds: Sequence[FoldData]) -> list[Answer]:
@@ -164,7 +167,7 @@ def one_line(error: BaseException) -> str:
 @contextmanager
 def _at_hand(job: Job) -> Iterator[Spec]:
     """Provide the job's spec, with the files behind it in a temporary folder where they were sent along."""
-    if job.spec.path is None:
+    if job.spec.path is None or job.spec.matched is not None:
         yield job.spec
         return
     if job.files is None:
@@ -254,7 +257,11 @@ def _predicted(fit: _Fit, fold: FoldData) -> Answer:
         return Answer("failed", fit.error, fit_s=fit.seconds, shared_by=fit.shared_by)
     began = time.perf_counter()
     try:
+        skipped = _skipped(fit.model, fold)
+        if skipped and all(skipped):
+            return Answer("skipped", skipped[0], fit_s=fit.seconds, shared_by=fit.shared_by)
         S = _predict(fit.model, fold)
+        S[[i for i, reason in enumerate(skipped) if reason]] = np.nan
         predict_s = (time.perf_counter() - began) / len(S)
         params = (
             json.loads(json.dumps(asdict(fit.model), default=str))
@@ -267,7 +274,26 @@ def _predicted(fit: _Fit, fold: FoldData) -> Answer:
     files, notes = _kept(fit.model)
     if isinstance(report := getattr(fit.model, "report", None), FitReport):
         notes["fit_report"] = report.as_dict()
-    return Answer("", "", S, fit.seconds, fit.shared_by, predict_s, params, count_parameters(fit.model), files, notes)
+    elif isinstance(report, ReplayReport):
+        notes["replay_report"] = report.as_dict()
+    return Answer(
+        "", "", S, fit.seconds, fit.shared_by, predict_s, params, count_parameters(fit.model), files, notes,
+        skipped=skipped,
+    )  # fmt: skip
+
+
+def _skipped(model: Any, fold: FoldData) -> tuple[str, ...]:
+    """Reason for each row why the model does not predict it, "" where it does; () where it predicts all.
+
+    Raises:
+        ValueError: the model gives another number of reasons.
+    """
+    if fold.context is None or not callable(getattr(model, "skip_windows", None)):
+        return ()
+    reasons = tuple(str(reason) for reason in model.skip_windows(fold.context, fold.U.shape[1]))
+    if len(reasons) != len(fold.s0):
+        raise ValueError(f"skip_windows gives {len(reasons)} reasons for {len(fold.s0)} rows; accepted: one for each")
+    return reasons if any(reasons) else ()
 
 
 def _with_band(answer: Answer, job: Job, model: Any, fold: FoldData) -> Answer:
@@ -296,14 +322,18 @@ def _band(job: Job, model: Any, fold: FoldData) -> tuple[np.ndarray | None, str]
     if not folds:
         return None, f"the training and validation runs are of fewer than {LEAST_GROUPS} groups"
     _seed_global_draws(job.seed)
-    ratios = []
+    ratios, asked = [], list[bool]()
     for fit, part, truth in zip(_fit(job, folds), folds, truths, strict=True):
         if fit.error:
             return None, f"without some of the runs, {fit.error}"
+        asked += [not reason for reason in _skipped(fit.model, part) or ("",) * len(truth)]
         error = np.abs(state_error(truth, _predict(fit.model, part))[..., MOTION])
         with np.errstate(divide="ignore", invalid="ignore"):
             ratios.append(error / band_shape(fit.model, part.s0.copy(), part.U.copy()))
-    factor = band_factor(np.concatenate(ratios), groups)
+    predicted_groups = [group for group, wanted in zip(groups, asked, strict=True) if wanted]
+    if len(set(predicted_groups)) < LEAST_GROUPS:
+        return None, f"the training and validation runs that it predicts are of fewer than {LEAST_GROUPS} groups"
+    factor = band_factor(np.concatenate(ratios)[asked], predicted_groups)
     if not np.isfinite(factor).all():
         return None, "too many rollouts over left-out runs are not finite"
     return factor * band_shape(model, fold.s0.copy(), fold.U.copy()), ""

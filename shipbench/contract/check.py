@@ -11,6 +11,7 @@ from ..names import brief
 from ..predictors.base import make_predictor
 from ..records import Dataset
 from ..registry import reason
+from ..replay.bind import bound
 from ..signals import COMMANDS
 from ..specs import spec_of
 from .base import BROKEN, NOT_APPLICABLE, PASSED, Rule, Verdict
@@ -76,7 +77,12 @@ def check_model(model: Any, data: Dataset | None = None, device: str | None = No
                 "predict(s0, U, history=None)."
             )
     inputs = tuple(getattr(model, "inputs", COMMANDS)) if spec.saved else COMMANDS
-    used = small_harbour(inputs=inputs) if data is None else few_windows(data)
+    if getattr(model, "replay", False):
+        if data is None:
+            raise InputError(f"model '{text}' belongs to recorded runs. Accepted: their data set, with -d DATASET.")
+        spec = bound(spec, data)
+        model = make_predictor(spec, device)
+    used = small_harbour(inputs=inputs) if data is None else few_windows(data, getattr(model, "skip_windows", None))
     if inputs != used.inputs and spec.saved:
         raise InputError(
             f"the saved model uses the inputs {', '.join(inputs)}; data set '{used.name}' has "

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from ..errors import InputError
 from ..physics.mmg import load_mmg_ship
+from ..predictors.context import Context
 from ..records import Dataset, Run
 from ..signals import COMMANDS
 from ..simulate.harbour import draw_plan, fly
@@ -36,14 +38,22 @@ def small_harbour(
     )
 
 
-def few_windows(data: Dataset) -> Dataset:
-    """Windows of `data`, evenly spread: at most `NUM_RUNS` of at most `STEPS` steps.
+def few_windows(data: Dataset, skips: Callable[[Context, int], Sequence[str]] | None = None) -> Dataset:
+    """Windows of `data`, evenly spread: at most `NUM_RUNS` of at most `STEPS` steps; without those for which `skips`
+    gives a reason.
 
     Raises:
         InputError: there are fewer than `MIN_RUNS` windows.
     """
     longest = max(len(run) for run in data.runs) - 1
     windows = data.windows(min(STEPS, longest))
+    if skips is not None:
+        reasons = skips(Context.of(windows), min(STEPS, longest))
+        if not (kept := [i for i, reason in enumerate(reasons) if not reason]):
+            raise InputError(
+                f"the model predicts no window of '{data.name}': {reasons[0]}. Give runs that it predicts."
+            )
+        windows = windows.subset(kept)
     if len(windows) < MIN_RUNS:
         found = f"data set '{data.name}' has {len(windows)} windows of {min(STEPS, longest)} steps"
         raise InputError(f"{found}; the check needs {MIN_RUNS}. Leave --dataset out, or give more runs.")

@@ -75,7 +75,7 @@ def comparison_table(scores: Scores) -> Table:
         ]
         notes.append(
             "Win rate: how often the model has the lower ED of a run, over runs and other ranked models; a run "
-            "without a score is lost."
+            "without a score is lost. A window that a model does not cover is left out."
         )
         notes.append("p, next better: of the paired test against the model one rank above, as in the table of pairs.")
     if several_seeds:
@@ -118,7 +118,10 @@ def pair_table(scores: Scores) -> Table:
     ]
     if runs < FEW_RUNS:
         notes.append(f"Only {runs} runs: with so few, intervals and p are rough.")
-    left_out = [m for m in scores.ranked if m not in matched.complete]
+    for model in (m for m in scores.ranked if m in matched.comparable and m not in matched.complete):
+        scored, expected = scores.shares[model]
+        notes.append(f"`{model}` is compared on the {scored} of {expected} windows that it covers.")
+    left_out = [m for m in scores.ranked if m not in matched.comparable]
     if left_out:
         names = ", ".join(f"`{m}`" for m in left_out)
         notes.append(f"Not tested: {names}; leaving out the runs where a model has no score would favour it.")

@@ -30,7 +30,7 @@ def lead(scores: Scores) -> str:
         f"'{first}' is first: mean position error (ED) {_metres(errors[first]['ed_mean'])}, '{second}' "
         f"{_metres(errors[second]['ed_mean'])}."
     )
-    return f"{behind} {_certainty(scores, first, second)}"
+    return " ".join([behind, *_partly(scores, first, second), _certainty(scores, first, second)])
 
 
 def lead_tiles(scores: Scores, horizon: float) -> list[Tile]:
@@ -61,6 +61,15 @@ def lead_tiles(scores: Scores, horizon: float) -> list[Tile]:
     ]  # fmt: skip
 
 
+def _partly(scores: Scores, *models: str) -> list[str]:
+    """Sentences on models that cover a part of the windows only."""
+    return [
+        f"'{model}' covers {scores.shares[model][0]} of {scores.shares[model][1]} windows."
+        for model in models
+        if model in scores.matched.comparable and model not in scores.matched.complete
+    ]
+
+
 def _certainty(scores: Scores, first: str, second: str) -> str:
     pair = next((p for p in scores.pairs if (p.first, p.second) == (first, second)), None)
     if pair is None:
@@ -70,10 +79,11 @@ def _certainty(scores: Scores, first: str, second: str) -> str:
     if pair.difference == 0.0:
         return f"They do not differ on {_runs(scores)}."
     sure = "The difference is significant" if pair.p_holm < _CERTAIN else "The difference is not significant"
-    return (
-        f"{sure}: {_metres(abs(pair.difference))}{_between(*sorted((-pair.high, -pair.low)))}, "
-        f"{_p(scores, pair)}, {_runs(scores)}."
-    )
+    size = f"{_metres(abs(pair.difference))}{_between(*sorted((-pair.high, -pair.low)))}, {_p(scores, pair)}"
+    if pair.windows == len(scores.matched.codes):
+        return f"{sure}: {size}, {_runs(scores)}."
+    better = first if pair.difference < 0 else second
+    return f"On the {pair.windows} windows of both, '{better}' is better by {size}."
 
 
 def _p(scores: Scores, pair: Pair) -> str:

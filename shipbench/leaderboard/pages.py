@@ -21,6 +21,7 @@ from .board import Board
 from .fit_notes import MARK, fit_notes
 from .formats import check_formats, render
 from .lead import lead, lead_tiles, short_table
+from .replay_notes import replay_notes
 from .scores import Scores, cluster_of
 
 SPLITS = {
@@ -68,11 +69,13 @@ def scores_of(results: Results, dataset: str, baseline: str | None = None) -> Sc
 
 
 def _board(scores: Scores, summaries: list[dict[str, Any]]) -> Board:
-    tables: list[Table | None] = [_marked(board_tables.table_iii(scores), scores.dataset, summaries)]
+    first = _marked(board_tables.table_iii(scores), scores.dataset, summaries)
+    told = [f"`{model}`: {note}" for (_, model), notes in replay_notes(summaries).items() for note in notes]
+    tables: list[Table | None] = [replace(first, notes=[*first.notes, *told])]
     if scores.beside_paper and {"physics", "mlp"} <= set(scores.models):
         tables.append(board_tables.claim(scores))
     tables.append(board_statistics.comparison_table(scores))
-    if len(scores.matched.complete) > 1 and len(scores.ranked) > 1:
+    if len(scores.matched.comparable) > 1 and len(scores.ranked) > 1:
         tables.append(board_statistics.pair_table(scores))
     tables += [board_tables.horizon_table(scores), board_tables.signal_table(scores), board_tables.band_table(scores)]
     if scores.rows["kind"].nunique() > 1:

@@ -174,19 +174,23 @@ class Scores:
         """ED of every model on the same windows, averaged over its seeds."""
         keys = self.rows[["fold", "run", "cluster"]].drop_duplicates(["fold", "run"]).sort_values(["fold", "run"])
         errors = np.full((len(keys), len(self.models)), np.nan)
+        asked = np.ones(errors.shape, bool)
+        windows = list(zip(keys["fold"], keys["run"], strict=True))
         for j, model in enumerate(self.models):
             part = self.rows[self.rows["model"] == model]
             by_window = part.assign(ed=part["ed"].where(part["status"] == "ok")).groupby(["fold", "run"])["ed"]
             mean = by_window.mean().where(
                 by_window.count() == part["seed"].nunique()
             )  # a window that one seed lost is lost
-            errors[:, j] = mean.reindex(list(zip(keys["fold"], keys["run"], strict=True))).to_numpy(float)
+            errors[:, j] = mean.reindex(windows).to_numpy(float)
+            skipped = part.assign(skipped=part["status"] == "skipped").groupby(["fold", "run"])["skipped"].all()
+            asked[:, j] = ~skipped.reindex(windows).fillna(False).to_numpy(bool)
         weights = 1.0 / keys.groupby("fold")["run"].transform("size").to_numpy(float)
-        return Matched(self.models, errors, weights, self.boot.codes(keys["cluster"].tolist()), self.boot)
+        return Matched(self.models, errors, weights, self.boot.codes(keys["cluster"].tolist()), self.boot, asked)
 
     @cached_property
     def pairs(self) -> list[Pair]:
-        """Comparisons of every two ranked models that are complete, on the same windows."""
+        """Comparisons of every two ranked models that are comparable, on the same windows."""
         return self.matched.pairs(self.ranked)
 
     def values(self, column: str, model: str) -> dict[str, Any]:

@@ -134,7 +134,8 @@ class _Reading:
             return
         ok = np.array([status == "ok" for status in summary["run_status"]])
         self._errors(summary, batch.truth[ok], S[ok])
-        self._tracks(cell.model, batch, S, W, summary["dt"])
+        predicted = np.array([status != "skipped" for status in summary["run_status"]])
+        self._tracks(cell.model, batch, S, W, summary["dt"], predicted)
 
     def _batch(self, cell: Cell, source: Path) -> Batch:
         if (source, cell.fold) not in self._truth:
@@ -147,12 +148,14 @@ class _Reading:
         turned = np.rad2deg(np.abs(wrap_angle(S[:, knots, PSI] - truth[:, knots, PSI])))
         self.errors.setdefault(summary["model"], []).append((ed(true=truth[:, knots], pred=S[:, knots]), turned))
 
-    def _tracks(self, model: str, batch: Batch, S: np.ndarray, W: np.ndarray | None, dt: float) -> None:
+    def _tracks(
+        self, model: str, batch: Batch, S: np.ndarray, W: np.ndarray | None, dt: float, predicted: np.ndarray
+    ) -> None:
         knots = _thin(S.shape[1] + 1, self.most)
         if len(knots) <= S.shape[1]:
             self.thinned = len(knots)
         for i, run in enumerate(batch.ids):
-            if run in self.chosen:
+            if run in self.chosen and predicted[i]:
                 if run not in self.tracks:
                     self.tracks[run] = Track(
                         run, dt * knots, np.concatenate([batch.s0[i : i + 1], batch.truth[i]])[knots]

@@ -170,7 +170,8 @@ class Matched:
     """Errors of every model on the same windows, (windows, models), seeds averaged; NaN where a model has no score.
 
     `weights` (windows,) make the weighted mean the mean over folds of the fold means. `codes` (windows,) are the runs
-    of the windows.
+    of the windows. `asked` (windows, models) is false where a model does not predict a window by what it is, as
+    trajectories from a file that cover other ones; None: all are asked.
     """
 
     models: list[str]
@@ -178,6 +179,7 @@ class Matched:
     weights: np.ndarray
     codes: np.ndarray
     boot: Bootstrap
+    asked: np.ndarray | None = None
 
     def of(self, model: str) -> np.ndarray:
         """Errors of one model (windows,)."""
@@ -191,6 +193,31 @@ class Matched:
     def complete(self) -> list[str]:
         """Models with a score in every window: leaving out the windows where a model fails would favour it."""
         return [m for m in self.models if np.isfinite(self.of(m)).all()]
+
+    @cached_property
+    def comparable(self) -> list[str]:
+        """Models with a score in every window that they are asked for, one at least."""
+        return [m for m in self.models if self._asks(m).any() and np.isfinite(self.of(m)[self._asks(m)]).all()]
+
+    def _asks(self, model: str) -> np.ndarray:
+        """Mask of the windows that a model is asked for (windows,)."""
+        return np.ones(len(self.codes), bool) if self.asked is None else self.asked[:, self._places[model]]
+
+    def common(self, first: str, second: str) -> Matched | None:
+        """Errors on the windows that both models are asked for, or None where there is none."""
+        both = self._asks(first) & self._asks(second)
+        if both.all():
+            return self
+        key = both.tobytes()
+        if key not in self._parts:
+            names, codes = np.unique(self.codes[both], return_inverse=True)
+            boot = Bootstrap([self.boot.names[i] for i in names], len(self.boot.counts))
+            self._parts[key] = Matched(self.models, self.errors[both], self.weights[both], codes, boot)
+        return self._parts[key] if both.any() else None
+
+    @cached_property
+    def _parts(self) -> dict[bytes, Matched]:
+        return {}
 
     def means(self, models: Sequence[str]) -> np.ndarray:
         """Mean error of each of `models` in each resample, (resamples, models)."""
@@ -206,35 +233,44 @@ class Matched:
         return len(np.unique(self.codes))
 
     def skill(self, model: str, baseline: str) -> tuple[float, float, float]:
-        """Skill 1 - error / error of `baseline` with its interval; NaN unless both are complete and the baseline has an
-        error."""
-        if not {model, baseline} <= set(self.complete) or not self.mean(baseline) > 0:
+        """Skill 1 - error / error of `baseline` with its interval, on the windows that both are asked for; NaN unless
+        both are comparable and the baseline has an error."""
+        on = self.common(model, baseline)
+        if not {model, baseline} <= set(self.comparable) or on is None or not on.mean(baseline) > 0:
             return (float("nan"),) * 3
-        drawn = self.means([model, baseline])
+        drawn = on.means([model, baseline])
         with np.errstate(invalid="ignore", divide="ignore"):
             ratio = drawn[:, 0] / drawn[:, 1]
-        return (1.0 - self.mean(model) / self.mean(baseline), *interval(1.0 - ratio, self.clusters))
+        return (1.0 - on.mean(model) / on.mean(baseline), *interval(1.0 - ratio, on.clusters))
 
     def wins(self, model: str, others: Sequence[str]) -> np.ndarray:
         """Share of `others` that `model` beats in each window (windows,); a tie counts half, a window without a score
-        is lost."""
+        is lost. One of the two that is not asked for a window leaves it out; NaN where that leaves no other model."""
         own = np.nan_to_num(self.of(model), nan=np.inf)
         theirs = np.nan_to_num(np.stack([self.of(other) for other in others]), nan=np.inf)
-        return np.mean(np.where(own < theirs, 1.0, np.where(own == theirs, 0.5, 0.0)), axis=0)
+        won = np.where(own < theirs, 1.0, np.where(own == theirs, 0.5, 0.0))
+        asked = np.stack([self._asks(other) for other in others]) & self._asks(model)
+        count = asked.sum(axis=0)
+        return np.where(count > 0, np.where(asked, won, 0.0).sum(axis=0) / np.maximum(count, 1), np.nan)
 
     def win_rate(self, model: str, others: Sequence[str]) -> tuple[float, float, float]:
         """Mean of `wins` with its interval."""
         won = self.wins(model, others)
+        known = np.isfinite(won)
+        if not known.any():
+            return (float("nan"),) * 3
         drawn = self.boot.means(self.codes, won[:, None], self.weights[:, None])[:, 0]
-        return (float(np.average(won, weights=self.weights)), *interval(drawn, self.clusters))
+        mean = float(np.average(won[known], weights=self.weights[known]))
+        return mean, *interval(drawn, len(np.unique(self.codes[known])))
 
     def pairs(self, models: Sequence[str]) -> list[Pair]:
-        """Comparisons of every two of `models` that are complete, in the order given; p adjusted over all of them after
-        Holm (1979)."""
+        """Comparisons of every two of `models` that are comparable, in the order given, on the windows that both are
+        asked for; p adjusted over all of them after Holm (1979)."""
         from statsmodels.stats.multitest import multipletests
 
-        names = [m for m in models if m in self.complete]
-        found = [self._pair(a, b) for i, a in enumerate(names) for b in names[i + 1 :]]
+        names = [m for m in models if m in self.comparable]
+        both = ((a, b) for i, a in enumerate(names) for b in names[i + 1 :])
+        found = [on._pair(a, b) for a, b in both if (on := self.common(a, b)) is not None]
         known = [i for i, pair in enumerate(found) if np.isfinite(pair.p)]
         if not known:
             return found

@@ -72,6 +72,11 @@ def table_iii(scores: Scores) -> Table:
             "Runs: scored of expected. A model with unscored runs ranks below all complete ones; the reasons stand "
             "below."
         )
+    for model in (m for m in scores.matched.comparable if m not in scores.matched.complete):
+        notes.append(
+            f"`{model}` covers {shares[model][0]} of {shares[model][1]} windows; its means are of those. The table of "
+            "pairs compares it with each model on the same windows."
+        )
     undefined = int(scores.scored[metrics].isna().any(axis=1).sum())
     if undefined:
         notes.append(f"In {undefined} rows the true ship does not move: cVDM has no scale there and leaves them out.")

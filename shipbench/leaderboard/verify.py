@@ -90,6 +90,7 @@ def _compare_scores(
     summary: dict[str, Any], cell: Cell, own: Frame, batch: Batch, S: np.ndarray, W: np.ndarray | None
 ) -> list[str]:
     reasons = divergence(batch.truth, S, summary["dt"])
+    skipped = (own["status"] == "skipped").to_numpy() & np.isnan(S).all(axis=(1, 2))
     ok = np.array([not reason for reason in reasons])
     W = W if summary["task"].get("bands") else None
     again = measure(summary["task"]["metrics"], batch, S, L=summary["ship_L"], dt=summary["dt"], ok=ok, W=W)
@@ -97,6 +98,8 @@ def _compare_scores(
     if summary["task"].get("bands") and W is None:
         found.append(f"{cell.label}: the rows hold scores of a band, and no band is saved.")
     for i, run in enumerate(batch.ids):
+        if skipped[i]:  # nothing was predicted, and the reason follows from no prediction
+            continue
         status, said = "ok" if ok[i] else "diverged", own["status"].iloc[i]
         if said != status:
             found.append(f"{cell.label}, run {run}: status is '{said}' in the rows, '{status}' from the predictions.")
@@ -109,7 +112,7 @@ def _compare_scores(
     for name, values in again.items():
         said = own[name].to_numpy(float)
         for i in np.flatnonzero(~np.isclose(said, values, rtol=TOLERANCE, atol=1e-12, equal_nan=True)).tolist():
-            if own["status"].iloc[i] == ("ok" if ok[i] else "diverged"):
+            if skipped[i] or own["status"].iloc[i] == ("ok" if ok[i] else "diverged"):
                 found.append(
                     f"{cell.label}, run {batch.ids[i]}: {name} is {said[i]:.10g} in the rows, {values[i]:.10g} from "
                     "the predictions."

@@ -56,6 +56,7 @@ class Predictor(Protocol):
         num_parameters: count of fitted numbers.
         seeded: False where nothing is drawn at random.
         context: an argument of `predict` of that name is given the `Context` of the runs.
+        skip_windows: `skip_windows(context, steps)`, the reason for each row why it cannot be predicted, or "".
         replay: True where the states do not follow from s0 and U, since they are read from a file.
         earth_fixed: True where the model knows a place on earth.
         device: set by `--device` ("cpu", "cuda", "cuda:1") before it fits or predicts.
@@ -278,7 +279,10 @@ def _of_file(spec: Spec) -> Any:
     """Model of a file or folder that a registered predictor reads."""
     if spec.effects:
         raise _no_effects(spec)
-    return PREDICTORS.get(spec.reader).of_file(spec.path, {k: v for k, v in spec.params.items() if k != "seed"})
+    model = PREDICTORS.get(spec.reader).of_file(spec.path, {k: v for k, v in spec.params.items() if k != "seed"})
+    if spec.matched is not None:
+        model.matched = spec.matched
+    return model
 
 
 def _made(spec: Spec) -> Any:

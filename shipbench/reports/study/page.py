@@ -83,7 +83,7 @@ def _tiles(sections: Sequence[dict[str, Any]], results: Results) -> list[Tile]:
                     f"mean position error ED {mean:.3g} m over {section['horizon']:g} s",
                 )
             )
-    bad = sum(s["status"] != "ok" for s in results.summaries)
+    bad = sum(any(status != "ok" for status in s["run_status"]) for s in results.summaries)
     models, windows = results.rows["model"].nunique(), len(results.rows[["dataset", "run"]].drop_duplicates())
     status = "the reasons are under Status" if bad else "every prediction was scored"
     return [

@@ -1,0 +1,172 @@
+"""Frame and units of predicted trajectories against the measured runs that they match: what differs, by how much, and
+the line that corrects it. Nothing is corrected here."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..effects.unit_or_sign_error import FACTORS
+from ..predictors.predictions import Trajectory
+from ..records import Run
+from ..ship import Ship
+from ..signals import PSI, STATES, R, U, V, wrap_angle
+from .thresholds import THRESHOLDS
+
+Pair = tuple[Trajectory, Run]
+
+
+@dataclass(frozen=True)
+class _Frame:
+    """Frame of the earth: its name, its correction as a line, and the map of track (m, 2) [m] and heading (m,) into
+    ours."""
+
+    name: str
+    line: str
+    to_ours: Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
+
+
+_FRAMES = (
+    _Frame(
+        "angles in degrees",
+        "psi = radians(psi)",
+        lambda xy, psi: (xy, np.deg2rad(psi)),
+    ),
+    _Frame(
+        "y to the left (west) and headings counterclockwise",
+        "y = -y, psi = -psi, v = -v, r = -r",
+        lambda xy, psi: (xy * [1.0, -1.0], -psi),
+    ),
+    _Frame(
+        "y to the left (west) and headings counterclockwise in degrees",
+        "y = -y, psi = -radians(psi), v = -v, r = -r",
+        lambda xy, psi: (xy * [1.0, -1.0], -np.deg2rad(psi)),
+    ),
+    _Frame("north and east exchanged", "x, y = y, x", lambda xy, psi: (xy[:, ::-1], psi)),
+    _Frame(
+        "x to the east, y to the north, and headings counterclockwise from east",
+        "x, y = y, x; psi = pi/2 - psi, v = -v, r = -r",
+        lambda xy, psi: (xy[:, ::-1], math.pi / 2.0 - psi),
+    ),
+    _Frame(
+        "x to the east, y to the north, and headings counterclockwise from east in degrees",
+        "x, y = y, x; psi = pi/2 - radians(psi), v = -v, r = -r",
+        lambda xy, psi: (xy[:, ::-1], math.pi / 2.0 - np.deg2rad(psi)),
+    ),
+)
+"""Frames that programs use, beside ours."""
+
+
+def frame_notes(pairs: Sequence[Pair], ship: Ship, dt: float) -> list[str]:
+    """Notes on starts far from the measured ones: the size, the probable cause, and the line that corrects it."""
+    seen = [begin for pair in pairs if (begin := _begin(pair, ship, dt)) is not None]
+    if not seen:
+        return []
+    notes = []
+    turned = np.array([abs(wrap_angle(b.psi[0] - b.true_psi[0])) for b in seen])
+    place = np.array([np.hypot(*(b.xy[0] - b.true_xy[0])) for b in seen])
+    other_heading = math.radians(THRESHOLDS.value("other_heading"))
+    far = THRESHOLDS.value("other_place") * ship.L
+    frame = _explaining(seen, ship)
+    if np.median(turned) > other_heading or (frame is not None and np.median(place) > far):
+        cause = (
+            f"Probable cause: {frame.name}; correct the files by {frame.line}."
+            if frame is not None
+            else "No usual frame explains it; check psi, x and y: rad clockwise from north, m north, m east."
+        )
+        notes.append(
+            f"headings at the start differ by {math.degrees(float(np.median(turned))):.3g} deg (median over "
+            f"{len(seen)} trajectories), positions by {float(np.median(place)):.4g} m. {cause}"
+        )
+    elif np.median(place) > far:
+        notes.append(_origin_note(seen, place, ship))
+    return notes + ([] if frame is not None else _unit_notes(pairs))
+
+
+@dataclass(frozen=True, eq=False)
+class _Begin:
+    """First seconds of a trajectory and of its run: tracks (m, 2) [m] and headings (m,) [rad]."""
+
+    xy: np.ndarray
+    psi: np.ndarray
+    true_xy: np.ndarray
+    true_psi: np.ndarray
+
+
+def _begin(pair: Pair, ship: Ship, dt: float) -> _Begin | None:
+    """Beginning of a trajectory beside the measured one; None where they do not overlap, or it is not finite."""
+    trajectory, run = pair
+    offset = round((trajectory.start - float(run.t[0])) / dt)
+    i, k = max(0, -offset), max(0, offset)
+    steps = math.ceil(THRESHOLDS.value("frame_time") * math.sqrt(ship.L / 130.0) / dt)
+    states, truth = trajectory.states[i : i + steps + 1], run.states[k : k + steps + 1]
+    m = min(len(states), len(truth))
+    if m < 1 or not np.isfinite(states[:m, : PSI + 1]).all():
+        return None
+    return _Begin(states[:m, :PSI], states[:m, PSI], truth[:m, :PSI], truth[:m, PSI])
+
+
+def _explaining(seen: Sequence[_Begin], ship: Ship) -> _Frame | None:
+    """Frame under which the beginnings agree with the measured ones much better than as they are, or None."""
+
+    def error(to_ours: Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]) -> float:
+        found = []
+        for b in seen:
+            xy, psi = to_ours(b.xy, b.psi)
+            turned = abs(float(wrap_angle(psi[0] - b.true_psi[0])))
+            way = np.hypot(*((xy[-1] - xy[0]) - (b.true_xy[-1] - b.true_xy[0])))
+            made = max(float(np.hypot(*(b.true_xy[-1] - b.true_xy[0]))), 0.1 * ship.L)
+            found.append(turned + min(float(way) / made, 2.0))
+        return float(np.median(found))
+
+    plain = error(lambda xy, psi: (xy, psi))
+    errors = [error(frame.to_ours) for frame in _FRAMES]
+    best = int(np.argmin(errors))
+    explained = errors[best] <= THRESHOLDS.value("explained") * plain
+    return _FRAMES[best] if explained and plain > math.radians(THRESHOLDS.value("other_heading")) / 2.0 else None
+
+
+def _origin_note(seen: Sequence[_Begin], place: np.ndarray, ship: Ship) -> str:
+    apart = np.array([b.xy[0] - b.true_xy[0] for b in seen])
+    middle = np.median(apart, axis=0)
+    size = f"positions at the start differ by {float(np.median(place)):.4g} m (median over {len(seen)} trajectories)."
+    if np.median(np.hypot(*(apart - middle).T)) <= THRESHOLDS.value("explained") * np.median(place):
+        north, east = -middle
+        return f"{size} Probable cause: another origin; correct the files by x = x {north:+.4g}, y = y {east:+.4g}."
+    if np.median([np.hypot(*b.xy[0]) for b in seen]) <= THRESHOLDS.value("start_position") * ship.L:
+        return (
+            f"{size} Probable cause: each trajectory starts at x = y = 0; correct the files by adding the measured "
+            "start, x = x + x_start, y = y + y_start."
+        )
+    return f"{size} No common origin explains it; check x and y, and the runs that the ids name."
+
+
+def _unit_notes(pairs: Sequence[Pair]) -> list[str]:
+    """Notes on speeds in another unit or with another sign, by their values at the start."""
+    notes = []
+    for column in (U, V, R):
+        name = STATES[column]
+        values, truths = [], []
+        for trajectory, run in pairs:
+            k = round((trajectory.start - float(run.t[0])) / run.dt) if len(run) > 1 else 0
+            if 0 <= k < len(run) and np.isfinite(trajectory.states[0, column]):
+                values.append(trajectory.states[0, column])
+                truths.append(run.states[k, column])
+        mine, true = np.array(values), np.array(truths)
+        size = float(np.sum(np.abs(true)))
+        plain = float(np.sum(np.abs(mine - true)))
+        if size == 0.0 or plain <= THRESHOLDS.value("other_unit") * size:
+            continue
+        units = {"the other sign": -1.0} | FACTORS[name]
+        left = {unit: float(np.sum(np.abs(mine / factor - true))) for unit, factor in units.items()}
+        best = min(left, key=lambda unit: left[unit])
+        if left[best] <= THRESHOLDS.value("explained") * plain:
+            here, there = float(np.median(np.abs(mine))), float(np.median(np.abs(true)))
+            notes.append(
+                f"{name} at the start is {here:.3g} where {there:.3g} was measured (medians of the size). Probable "
+                f"cause: {best}; correct the files by {name} = {name} / {units[best]:.5g}."
+            )
+    return notes
