@@ -22,7 +22,7 @@ _LONGEST_TOLD = 200
 """Most characters of the values in the label of a model in memory."""
 _TAIL = rf"(?P<tail>(\+[^\[\]+]+({_PARAMS})?)*)"
 _FILE = re.compile(rf"(?P<base>[^\[\]]+\.py:\w+)(?P<params>{_PARAMS})?{_TAIL}")
-_READERS = {"predictions": re.compile(r"predictions:(.+)"), "fmu": re.compile(r"(.+\.fmu)")}
+READERS = {"predictions": re.compile(r"predictions:(.+)"), "fmu": re.compile(r"(.+\.fmu)")}
 """Predictors that are made of a file or folder, and the form of their specs."""
 _NAME = re.compile(rf"(?P<base>[^\[\]+]+)(?P<params>{_PARAMS})?{_TAIL}")
 
@@ -109,7 +109,7 @@ def parse_spec(text: str) -> Spec:
             "a saved folder."
         )
     base, params = match["base"], _params(text, match["params"])
-    for reader, named in _READERS.items():
+    for reader, named in READERS.items():
         if (found := named.fullmatch(base.strip())) is not None:
             return Spec(text, base.strip(), params, _effects(text, match["tail"]), Path(found[1]), reader=reader)
     effects = _effects(text, match["tail"])

@@ -68,7 +68,8 @@ def _model(part: dict[str, Any], about: list[str], meanings: dict[str, str], as_
     if part["unusable"]:
         say_wrapped(f"NOT USABLE HERE: {part['unusable']}")
     say("\nExample:")
-    say(f"  shipbench run --model {part['name']} --dataset demo --horizon 60")
+    example = {"predictions": "predictions:theirs"}.get(part["name"], part["name"])
+    say(f"  shipbench run --model {example} --dataset demo --horizon 60")
 
 
 def effects(name: _Name = None, as_json: Json = False) -> None:

@@ -299,6 +299,10 @@ def _made(spec: Spec) -> Any:
         half = "a file without its class" if family.endswith(".py") else "a class without its file"
         raise InputError(f"model spec '{spec.text}' names {half}. Give {meant}.")
     cls = class_from_file(spec.path, str(spec.class_name)) if spec.path is not None else PREDICTORS.get(family)
+    if spec.path is None and hasattr(cls, "of_file"):
+        raise InputError(
+            f"model spec '{spec.text}': '{spec.name}' is made of a file. Accepted: predictions:FOLDER, or path.fmu."
+        )
     if spec.effects and not hasattr(cls, "extend"):
         raise _no_effects(spec)
     params = {k: v for k, v in spec.params.items() if k != "seed"}

@@ -7,7 +7,7 @@ itself holds arrays only.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Self
 
@@ -83,8 +83,6 @@ class Predictions:
     """
 
     mapping: str = ""
-    path: Path | None = field(default=None, repr=False)
-    matched: Matched | None = field(default=None, repr=False)
     name: ClassVar[str] = "predictions"
     needs: ClassVar[tuple[str, ...]] = ()
     replay: ClassVar[bool] = True
@@ -92,6 +90,8 @@ class Predictions:
     seeded: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
+        self.path: Path | None = None
+        self.matched: Matched | None = None
         self.inputs: tuple[str, ...] = COMMANDS
         self.dt = float("nan")
         self.report: ReplayReport | None = None
@@ -108,7 +108,9 @@ class Predictions:
         """
         if unknown := [key for key in params if key != "mapping"]:
             raise unknown_parameter("'predictions'", unknown[0], ["mapping"])
-        return cls(str(params.get("mapping", "")), path)
+        model = cls(str(params.get("mapping", "")))
+        model.path = path
+        return model
 
     def fit(self, train: Dataset, valid: Dataset | None = None, *, seed: int = 0) -> Self:
         """Store sample time and inputs; nothing is fitted."""

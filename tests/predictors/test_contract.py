@@ -14,6 +14,7 @@ from shipbench.contract.subject import Subject
 from shipbench.errors import InputError
 from shipbench.predictors import neural_ode
 from shipbench.predictors.base import PREDICTORS, parse_spec
+from shipbench.specs import READERS
 
 SMALL = {
     "mlp": "mlp[epochs=2]",
@@ -33,7 +34,7 @@ def data():
         yield small_harbour()
 
 
-@pytest.fixture(scope="module", params=PREDICTORS.names())
+@pytest.fixture(scope="module", params=[name for name in PREDICTORS.names() if name not in READERS])
 def subject(request, data):
     return Subject(parse_spec(SMALL.get(request.param, request.param)), data)
 

@@ -1,0 +1,68 @@
+"""A frame or unit that differs is told with its size, its cause and the line that corrects it; a right one is not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from made_tracks import apart, predicted, rows_of
+
+from shipbench.predictors.predictions import Trajectory
+from shipbench.replay.frame import frame_notes
+
+FAULTS = {
+    "degrees": (lambda t: t.assign(psi=np.rad2deg(t["psi"])), "angles in degrees", "psi = radians(psi)"),
+    "left": (lambda t: t.assign(y=-t["y"], psi=-t["psi"], v=-t["v"], r=-t["r"]), "y to the left", "y = -y, psi = -psi"),
+    "exchanged": (lambda t: t.assign(x=t["y"], y=t["x"]), "north and east exchanged", "x, y = y, x"),
+    "mathematics": (
+        lambda t: t.assign(x=t["y"], y=t["x"], psi=np.rad2deg(np.pi / 2 - t["psi"]), v=-t["v"], r=-t["r"]),
+        "counterclockwise from east in degrees",
+        "psi = pi/2 - radians(psi)",
+    ),
+    "origin": (lambda t: t.assign(x=t["x"] + 5000.0, y=t["y"] - 700.0), "another origin", "x = x -5000, y = y +700"),
+    "knots": (lambda t: t.assign(u=t["u"] * 3600 / 1852), "knots", "u = u / 1.9438"),
+}
+
+
+@pytest.fixture
+def data(toy):
+    return apart(toy(runs=6, steps=40))
+
+
+def notes_on(data, change):
+    table = change(predicted(data, growth=0.1))
+    pairs = [(Trajectory(0.0, rows_of(table, run.id).iloc[:, 2:].to_numpy()), run) for run in data.runs]
+    return frame_notes(pairs, data.ship, data.dt)
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_the_cause_is_named_with_the_line_that_corrects_it(data, fault):
+    change, cause, line = FAULTS[fault]
+    [note] = notes_on(data, change)
+    assert cause in note, note
+    assert line in note, note
+
+
+def test_the_frame_of_the_data_set_gives_no_note(data):
+    assert notes_on(data, lambda t: t) == []
+    assert frame_notes([], data.ship, data.dt) == []
+
+
+def test_trajectories_that_all_begin_at_zero_are_told(data):
+    def at_zero(table):
+        first = table.groupby("trajectory")[["x", "y"]].transform("first")
+        return table.assign(x=table["x"] - first["x"], y=table["y"] - first["y"])
+
+    [note] = notes_on(data, at_zero)
+    assert "each trajectory starts at x = y = 0" in note
+    assert "x = x + x_start" in note
+
+
+def test_what_no_usual_frame_explains_is_told_with_its_size(data):
+    rng = np.random.default_rng(0)
+    [turned] = notes_on(data, lambda t: t.assign(psi=t["psi"] + 2.0))
+    assert "differ by 115 deg" in turned
+    assert "No usual frame explains it" in turned
+    [moved] = notes_on(
+        data, lambda t: t.assign(x=t["x"] + t["trajectory"].map({r.id: rng.normal(0, 900) for r in data.runs}))
+    )
+    assert "No common origin explains it" in moved
