@@ -32,10 +32,13 @@ from .common import (
     Device,
     Full,
     Json,
+    Predictions,
+    PredictionsMapping,
     Quiet,
     exit_if_failed,
     parse_seeds,
     parse_words,
+    predicted_models,
     print_json,
     say,
     say_wrapped,
@@ -148,13 +151,8 @@ _TrainOn = Annotated[
 def run(
     ctx: typer.Context,
     model: Annotated[list[str] | None, typer.Option("-m", "--model", help="Model spec; may be repeated.")] = None,
-    predictions: Annotated[
-        list[str] | None,
-        typer.Option("--predictions", help="File or folder of predicted trajectories, as a model; may be repeated."),
-    ] = None,
-    mapping: Annotated[
-        str | None, typer.Option("--mapping", help="Mapping (TOML) of the files of --predictions, as for a log.")
-    ] = None,
+    predictions: Predictions = None,
+    mapping: PredictionsMapping = None,
     dataset: Annotated[
         list[str] | None, typer.Option("-d", "--dataset", help="Registered name or folder; may be repeated.")
     ] = None,
@@ -217,10 +215,8 @@ def run(
     from ..leaderboard.fit_notes import fit_notes
     from ..leaderboard.pages import write_boards
 
-    given = f"[mapping={mapping}]" if mapping else ""
-    models = [*(model or []), *(f"predictions:{path}{given}" for path in predictions or [])]
     overrides = {
-        "models": models or None, "datasets": dataset or None, "folds": folds, "split": split,
+        "models": [*(model or []), *predicted_models(predictions, mapping)] or None, "datasets": dataset or None, "folds": folds, "split": split,
         "seeds": parse_seeds(seeds),
         "horizon_s": horizon, "history_s": history, "stride_s": stride, "max_runs": max_runs,
         "bands": bands or None, "simulated": simulated, "train_on": parse_words(train_on),
@@ -246,8 +242,8 @@ def run(
         show_boards(written, full)
         say(f"Results: {folder}\nLeaderboard: {', '.join(str(path) for _, path in written)}")
         if not quiet and (equations := outcome.equations):
-            fitted = "1 model" if len(equations) == 1 else f"{len(equations)} models"
-            say(f"Fitted equations of {fitted}, for example:\n  {next(iter(equations.values()))}")
+            models = "1 model" if len(equations) == 1 else f"{len(equations)} models"
+            say(f"Fitted equations of {models}, for example:\n  {next(iter(equations.values()))}")
     for (name, model_name), note in fit_notes(outcome.summaries).items():
         say_wrapped(f"warning: {name}, {model_name}: {note}", err=True)
     exit_if_failed(outcome.failed, f"{len(outcome.failed)} of {len(outcome.summaries)} fits")

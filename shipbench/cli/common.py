@@ -34,6 +34,13 @@ Device = Annotated[
     str | None,
     typer.Option(help="Where networks compute: cpu, cuda or cuda:1 (default cpu); physics stays on the CPU."),
 ]
+Predictions = Annotated[
+    list[str] | None,
+    typer.Option("--predictions", help="File or folder of predicted trajectories, as a model; may be repeated."),
+]
+PredictionsMapping = Annotated[
+    str | None, typer.Option("--mapping", help="Mapping (TOML) of the files of --predictions, as for a log.")
+]
 DatasetArgument = Annotated[str, typer.Argument(metavar="DATASET", help="Registered name or folder.")]
 
 
@@ -112,6 +119,21 @@ def parse_seeds(text: str | None) -> tuple[int, ...] | None:
 def parse_words(text: str | None) -> tuple[str, ...] | None:
     """Words of an option with commas between them, or None where it is not given."""
     return None if text is None else tuple(word.strip() for word in text.split(",") if word.strip())
+
+
+def predicted_models(paths: Sequence[str] | None, mapping: str | None) -> list[str]:
+    """Specs of the models of `--predictions`, with the mapping of `--mapping`.
+
+    Raises:
+        InputError: a mapping is given without predictions.
+    """
+    if mapping and not paths:
+        raise InputError(
+            f"--mapping {mapping} belongs to --predictions, which is not given. Accepted: --predictions FOLDER "
+            f"--mapping {mapping}."
+        )
+    given = f"[mapping={mapping}]" if mapping else ""
+    return [f"predictions:{path}{given}" for path in paths or []]
 
 
 def exit_if_failed(failed: Sequence[str], what: str) -> None:

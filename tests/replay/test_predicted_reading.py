@@ -125,7 +125,7 @@ def test_bad_files_are_one_message_each(data, tmp_path):
     with pytest.raises(InputError, match="holds no trajectories"):
         files_of(tmp_path / "empty")
     savemat(tmp_path / "other.mat", {"a": np.arange(5.0)})
-    with pytest.raises(InputError, match="no column t, x, y, psi. Found: a"):
+    with pytest.raises(InputError, match=r"no column t, x, y, psi\. Found: a"):
         read_tracks(tmp_path / "other.mat", "", data)
 
 
