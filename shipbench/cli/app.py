@@ -215,8 +215,9 @@ def run(
     from ..leaderboard.fit_notes import fit_notes
     from ..leaderboard.pages import write_boards
 
+    models = [*(model or []), *predicted_models(predictions, mapping)]
     overrides = {
-        "models": [*(model or []), *predicted_models(predictions, mapping)] or None, "datasets": dataset or None, "folds": folds, "split": split,
+        "models": models or None, "datasets": dataset or None, "folds": folds, "split": split,
         "seeds": parse_seeds(seeds),
         "horizon_s": horizon, "history_s": history, "stride_s": stride, "max_runs": max_runs,
         "bands": bands or None, "simulated": simulated, "train_on": parse_words(train_on),
@@ -241,12 +242,18 @@ def run(
     else:
         show_boards(written, full)
         say(f"Results: {folder}\nLeaderboard: {', '.join(str(path) for _, path in written)}")
-        if not quiet and (equations := outcome.equations):
-            models = "1 model" if len(equations) == 1 else f"{len(equations)} models"
-            say(f"Fitted equations of {models}, for example:\n  {next(iter(equations.values()))}")
+        if not quiet:
+            _tell_equations(outcome.equations)
     for (name, model_name), note in fit_notes(outcome.summaries).items():
         say_wrapped(f"warning: {name}, {model_name}: {note}", err=True)
     exit_if_failed(outcome.failed, f"{len(outcome.failed)} of {len(outcome.summaries)} fits")
+
+
+def _tell_equations(equations: dict[tuple[str, str], Path]) -> None:
+    """Say where the fitted equations are, if there are any."""
+    if equations:
+        models = "1 model" if len(equations) == 1 else f"{len(equations)} models"
+        say(f"Fitted equations of {models}, for example:\n  {next(iter(equations.values()))}")
 
 
 @app.command()
