@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,7 +20,7 @@ from shipbench.leaderboard.verify import verify
 from shipbench.replay.bind import bound
 from shipbench.specs import parse_spec
 
-LINES = {"horizon": 20, "folds": 2, "quiet": True}
+LINES: dict[str, Any] = {"horizon": 20, "folds": 2, "quiet": True}
 
 
 @pytest.fixture
