@@ -226,16 +226,10 @@ def run(
     tasks = load_tasks(config, overrides)
     name = Path(config).stem if config else file_name(Path(tasks[0].dataset).name)
     folder = out or free_folder(Path("runs") / name, tasks, resume)
-    outcome = run_tasks(
-        tasks,
-        folder,
-        resume=resume,
-        execution=execution,
-        progress=make_progress(quiet or as_json),
-        command=str(ctx.obj),
-    )
+    progress, command = make_progress(quiet or as_json), str(ctx.obj)
+    outcome = run_tasks(tasks, folder, resume=resume, execution=execution, progress=progress, command=command)
     tell = say if not quiet and not as_json else lambda line: None
-    written = write_boards(outcome.results, folder, str(ctx.obj), tell=tell)
+    written = write_boards(outcome.results, folder, command, tell=tell)
     if as_json:
         boards = {board.dataset: board.as_json() for board, _ in written}
         print_json({"out": str(folder), "leaderboards": boards, "failed": outcome.failed})

@@ -47,6 +47,7 @@ def test_the_trajectory_that_starts_last_counts_and_one_may_start_a_step_after_t
     batch, context = windows.batch(), Context.of(windows)
     S = model.fit(data).predict(batch.s0, batch.U, context=context)
     assert S[:, 0, 0].tolist() == [0.0, 0.0, 21.0, 21.0]
+    assert model.report is not None
     assert model.report.unknown == 1  # the window at 20 s: no state there is predicted
 
 
