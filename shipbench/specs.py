@@ -69,12 +69,12 @@ class Spec:
 
 
 def _value(text: str) -> Any:
-    """Value as a number, true, false, null, a list of them such as [20,20] or (20,20), or else the text itself."""
-    if text.startswith("(") and text.endswith(")"):
-        return [_value(item.strip()) for item in text[1:-1].split(",") if item.strip()]
+    """Value as a number, true, false, null, a list such as [20,20], (20,20) or [Xuu,Nrr], or else the text itself."""
     try:
         return json.loads(text)
     except (ValueError, RecursionError):
+        if text[:1] + text[-1:] in ("()", "[]"):
+            return [_value(item.strip()) for item in text[1:-1].split(",") if item.strip()]
         return text
 
 

@@ -8,6 +8,7 @@ import os
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # before numpy and torch load: pytest's workers share the cores
 
 from collections.abc import Iterator
+from functools import cache
 
 import pytest
 from hypothesis import settings
@@ -56,3 +57,29 @@ def plant():
     from shipbench.simulate.trials import Trials, sea_trials
 
     return Plant.of(sea_trials(load_mmg_ship("kcs"), 5, (), Trials(runs=4, samples=60)))
+
+
+@pytest.fixture(scope="session")
+def fmu_library(tmp_path_factory):
+    """Function of the version of FMI: the compiled library of the tests' FMU."""
+    import made_fmu
+
+    if not made_fmu.HAS_COMPILER:
+        pytest.skip(made_fmu.NO_COMPILER)
+    return cache(lambda fmi: made_fmu.library(tmp_path_factory.mktemp(f"fmi{fmi}"), fmi))
+
+
+@pytest.fixture(scope="session")
+def ship_fmu(tmp_path_factory, fmu_library):
+    """Function of the version of FMI: the FMU `ship.fmu` of the tests."""
+    import made_fmu
+
+    def made(fmi: int = 2):
+        path = tmp_path_factory.mktemp("ship") / "ship.fmu"
+        files: dict[str, str | bytes] = {
+            "modelDescription.xml": made_fmu.description(fmi),
+            **made_fmu.members(fmu_library(fmi), fmi),
+        }
+        return made_fmu.write_archive(path, files)
+
+    return cache(made)

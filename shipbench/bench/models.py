@@ -17,7 +17,7 @@ from .isolate import call_isolated
 from .provenance import source_digest
 
 _FOREIGN_CODE = frozenset({"fmu"})
-"""Readers of files that hold code of others."""
+"""Predictors that run code of others from a file."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ def facts_of(spec: Spec) -> ModelFacts:
     kind = _kind(spec)
     taken = [(EFFECTS, effect.name) for effect in spec.effects] + ([(PREDICTORS, kind)] if kind in PREDICTORS else [])
     packages = sorted({package for registry, name in taken if (package := registry.package(name))})
-    foreign = bool(packages) or spec.class_name is not None or spec.reader in _FOREIGN_CODE
+    foreign = bool(packages) or spec.class_name is not None or kind in _FOREIGN_CODE
     if foreign:
         made, unanswered = call_isolated(_made_alone, (spec,))
         if unanswered:
@@ -135,7 +135,8 @@ def _files(spec: Spec) -> dict[str, bytes]:
     if spec.class_name is not None:
         return code_of(spec.path)
     if spec.path.is_file():
-        return {spec.path.name: spec.path.read_bytes()}
+        beside = (spec.path, spec.path.with_name(f"{spec.path.name}.toml"))  # an FMU's mapping
+        return {p.name: p.read_bytes() for p in beside if p.is_file()}
     return {
         p.relative_to(spec.path.parent).as_posix(): p.read_bytes() for p in sorted(spec.path.rglob("*")) if p.is_file()
     }

@@ -2,19 +2,37 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from ..errors import unknown_name
+from ..errors import InputError, unknown_name
 from .common import Json, print_json, say, say_wrapped, screen_width, show_table
 
 _Name = Annotated[str | None, typer.Argument(metavar="[NAME]", help="Explain this one (default: list all).")]
 _COLUMN = 13
 
 
-def models(name: _Name = None, as_json: Json = False) -> None:
+def models(
+    name: Annotated[
+        str | None,
+        typer.Argument(metavar="[NAME]", help="Explain this one, or an FMU (default: list all)."),
+    ] = None,
+    propose: Annotated[
+        Path | None, typer.Option("--propose", help="With an FMU: write a draft of its mapping, and do nothing else.")
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace the draft of --propose.")] = False,
+    as_json: Json = False,
+) -> None:
     """List the models with their parameters, or explain one."""
+    if name is not None and name.endswith(".fmu"):
+        from .fmu import explain_fmu, propose_mapping
+
+        propose_mapping(Path(name), propose, force, as_json) if propose else explain_fmu(Path(name), as_json)
+        return
+    if propose is not None:
+        raise InputError("--propose serves an FMU; accepted: shipbench models ship.fmu --propose ship.fmu.toml")
     from ..predictors.registered import PREDICTORS
     from ..reports.listing import describe_parts, explain_part
 
@@ -68,7 +86,7 @@ def _model(part: dict[str, Any], about: list[str], meanings: dict[str, str], as_
     if part["unusable"]:
         say_wrapped(f"NOT USABLE HERE: {part['unusable']}")
     say("\nExample:")
-    example = {"predictions": "predictions:theirs"}.get(part["name"], part["name"])
+    example = {"predictions": "predictions:theirs", "fmu": "path/ship.fmu"}.get(part["name"], part["name"])
     say(f"  shipbench run --model {example} --dataset demo --horizon 60")
 
 

@@ -315,10 +315,14 @@ def _complete_pairs(found: Assigned, kept: dict[str, Any]) -> None:
 
 def sign_of(entry: Entry) -> None:
     """Note in the entry that its head counts to port."""
-    name = entry.columns[0].name.lower().replace("_", " ") if entry.columns else ""
-    if entry.channel in _SIDED and "sign" not in entry.spec and re.search(_TO_PORT, name):
+    if entry.columns and "sign" not in entry.spec and counts_to_port(entry.channel, entry.columns[0].name):
         entry.spec["sign"] = "port"
         entry.why.append("positive to port, from the name")
+
+
+def counts_to_port(channel: str, text: str) -> bool:
+    """Whether a name or description says that a channel is positive to port."""
+    return channel in _SIDED and re.search(_TO_PORT, text.lower().replace("_", " ")) is not None
 
 
 def quantity(channel: str) -> str:
