@@ -20,9 +20,9 @@ ROOT = Path(__file__).parent.parent
 SCRIPTS = {
     "rollouts_shipmmg": ("shipmmg",), "fit_scipy": (), "diagnosis_refits": (), "startup": (), "paper_study": (),
     "mlp_training": (),
-    "neural_ode_training": (), "many_runs": (),
+    "neural_ode_training": (), "many_runs": (), "fmu_calibration": ("fmpy",),
 }  # fmt: skip
-LONG = ("fit_scipy", "paper_study", "mlp_training", "neural_ode_training")
+LONG = ("fmu_calibration", "fit_scipy", "paper_study", "mlp_training", "neural_ode_training")
 
 
 @pytest.mark.long

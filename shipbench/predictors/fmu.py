@@ -109,6 +109,11 @@ class Fmu(PredictorBase):
         return bool({"x", "y", "psi"} & {link.channel for link in self._mapping.start})
 
     @property
+    def learns(self) -> bool:
+        """Whether `fit` calibrates parameters."""
+        return bool(self._open)
+
+    @property
     def num_parameters(self) -> int:
         """Count of calibrated parameters."""
         return len(self._open)

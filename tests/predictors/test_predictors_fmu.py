@@ -17,6 +17,7 @@ from shipbench.api import benchmark
 from shipbench.bench.submissions import read_results
 from shipbench.contract.check import check_model
 from shipbench.errors import InputError, WorkError
+from shipbench.exporting.formats import export
 from shipbench.predictors.base import make_predictor
 from shipbench.records import Dataset
 
@@ -166,6 +167,18 @@ def test_a_copy_has_processes_of_its_own(ship_fmu, trial):
     model = make_predictor(f"{ship_fmu()}[workers=1]").fit(trial)
     first = predicted(model, trial)
     np.testing.assert_array_equal(predicted(copy.deepcopy(model), trial), first)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_an_exported_model_predicts_the_same_as_an_fmu(fmi, harbour, tmp_path, fmu_library):
+    physics = make_predictor("physics+current[speed=0.4,to=1.0]").fit(harbour)
+    physics.save(tmp_path / "model")
+    path = export(str(tmp_path / "model"), "fmu", tmp_path / "ship.fmu", fmi=fmi)
+    model = make_predictor(str(path)).fit(harbour)
+    expected = predicted(physics, harbour)
+    np.testing.assert_allclose(predicted(model, harbour), expected, rtol=1e-9, atol=1e-9)
+    assert not model.learns
 
 
 @pytest.mark.long
