@@ -187,19 +187,22 @@ class Verdict(Diagnosis):
 
         compare = (
             f'Compare: shipbench.benchmark(["physics", "{self.extended_model}"], data)'
-            if self.extended_model != "physics"
+            if self.extended_model not in ("physics", self.simulation)
             else ""
         )
         return brief("\n".join([f"Diagnosis of {self.dataset}", headline(self), compare]).rstrip())
 
 
 def diagnose(
-    data: Data, *, gain: bool = True, seed: int = 0, workers: int = 2, thorough: bool = False, quiet: bool = False
-) -> Verdict:
+    data: Data, model: Any = None, *, gain: bool = True, seed: int = 0, workers: int = 2, thorough: bool = False,
+    quiet: bool = False,
+) -> Verdict:  # fmt: skip
     """Show what the physics model gets wrong on measured runs and name the causes, as `shipbench diagnose` does.
 
     Args:
         data: a data set, its registered name or its folder.
+        model: your own simulation, judged in place of the ship file's physics: a spec such as "sim.py:simulate", a
+            folder of a saved model, a class, or a function simulate(s0, U, dt).
         gain: measure the gain of the causes on held-out runs, which takes most of the time.
         seed: of folds and bootstrap.
         workers: number of processes; 1: everything runs in this one.
@@ -213,7 +216,8 @@ def diagnose(
     from .diagnosis.diagnose import diagnose as run
 
     with steps_shown(quiet):
-        found = run(_loaded(data), gain=gain, seed=seed, workers=workers, thorough=thorough)
+        simulation = None if model is None else spec_of(model)
+        found = run(_loaded(data), gain=gain, seed=seed, workers=workers, thorough=thorough, simulation=simulation)
     spec = "" if isinstance(data, Dataset) else os.fspath(data)
     return Verdict(**{f.name: getattr(found, f.name) for f in fields(found)} | {"spec": spec})
 

@@ -15,6 +15,12 @@ from .common import Commands, DatasetArgument, Full, Json, Quiet, print_json, sa
 
 def diagnose(
     dataset: DatasetArgument,
+    model: Annotated[
+        str | None,
+        typer.Option(
+            "-m", "--model", help="Your own simulation to judge, such as sim.py:simulate (default: the ship file's)."
+        ),
+    ] = None,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -42,15 +48,19 @@ def diagnose(
     from ..data.base import load_dataset
     from ..diagnosis.diagnose import diagnose as run
     from ..estimation.budget import Budget
-    from ..reports.diagnosis.files import document, write_diagnosis
-    from ..reports.diagnosis.text import summary_lines
+    from ..reports.diagnosis.files import document, with_correction, write_diagnosis
+    from ..reports.diagnosis.summary import summary_lines
+    from ..specs import parse_spec
 
     data = load_dataset(dataset)
     folder = out or Path("diagnoses") / file_name(Path(data.name).name)
     make_folder(folder)
     with steps_shown(quiet or as_json):
-        found = run(data, gain=gain, seed=seed, workers=workers, thorough=thorough, budget=Budget(seconds=cpu_limit))
-    found = replace(found, spec=dataset)
+        found = run(
+            data, gain=gain, seed=seed, workers=workers, thorough=thorough, budget=Budget(seconds=cpu_limit),
+            simulation=None if model is None else parse_spec(model),
+        )  # fmt: skip
+    found = with_correction(replace(found, spec=dataset), folder)
     written = write_diagnosis(found, folder)
     if as_json:
         print_json(document(found))

@@ -22,13 +22,16 @@ from ..estimation.forward import FOLD_STEPS, MOST_STEPS, THOROUGH_STEPS, Plant, 
 from ..estimation.gauss_newton import Fit
 from ..estimation.noise_selection import noise_in_words
 from ..estimation.outliers import left_out
+from ..predictors.physics_model.correction import Correction, correctable
 from ..processes import process_pool
 from ..records import Dataset
+from ..specs import Spec
 from ..steps import step, within
 from .candidates import describe_candidates
 from .evaluation.held_out_gain import FoldErrors, fold_errors, of_runs, on_fitted_runs, summarise
 from .evaluation.moved import moved
 from .evaluation.noise_floor import noise_floor
+from .evaluation.own_simulation import OwnSimulation, simulation_fold_errors, simulation_on_fitted_runs
 from .evaluation.residuals import what_is_wrong
 from .evaluation.series import trace_of
 from .explain import describe_causes, remaining, unknown_part, what_is_left
@@ -53,7 +56,7 @@ _WHOLE = 0.2
 def diagnose(
     dataset: Dataset, *, gain: bool = True, seed: int = 0, only: Sequence[str] | None = None, workers: int = 1,
     thorough: bool = False,
-    budget: Budget | None = None,
+    budget: Budget | None = None, simulation: Spec | None = None,
 ) -> Diagnosis:  # fmt: skip
     """Identify the causes of the plain physics model's errors on measured runs, and measure their held-out gain.
 
@@ -66,6 +69,7 @@ def diagnose(
         thorough: use up to twice as much of a long record (the folds use a quarter); 90 runs of 120 s are used whole
             either way.
         budget: limits of work and memory of the whole; default that of `Budget`. A warning states where it has acted.
+        simulation: model that is judged in place of the ship file's physics; see `evaluation.own_simulation`.
 
     Raises:
         InputError: the ship never moves, there are too few samples for any fit, the record contradicts itself,
@@ -74,17 +78,23 @@ def diagnose(
     if workers < 1:
         raise InputError(f"workers: {workers}; accepted: whole numbers from 1.")
     with limited(budget or Budget()) as used:
-        return _diagnosed(dataset, gain, seed, only, workers, THOROUGH_STEPS if thorough else MOST_STEPS, used)
+        steps = THOROUGH_STEPS if thorough else MOST_STEPS
+        return _diagnosed(dataset, gain, seed, only, workers, steps, used, simulation)
 
 
 def _diagnosed(
-    dataset: Dataset, gain: bool, seed: int, only: Sequence[str] | None, workers: int, steps: int, used: Budget
-) -> Diagnosis:
+    dataset: Dataset, gain: bool, seed: int, only: Sequence[str] | None, workers: int, steps: int, used: Budget,
+    judged: Spec | None,
+) -> Diagnosis:  # fmt: skip
     """Diagnosis within a budget that is counted, see `diagnose`."""
     step("read the record", 0.0, 0.02)
     began, fingerprint = time.perf_counter(), dataset.fingerprint
     ready = prepare(dataset, PASSES if only is None else GIVEN)
     dataset, units, settled, warnings = ready.dataset, list(ready.errors), ready.excluded, list(ready.notes)
+    simulation = None if judged is None else OwnSimulation(judged, dataset)
+    if simulation is not None:
+        step("step the simulation from every measured state", 0.01, 0.02)
+        dataset = simulation.beside(dataset)
     cautious = is_too_little(dataset)
     apart = len({run.group for run in dataset.runs}) > 1
     if not apart and len(dataset) > 1:
@@ -93,8 +103,17 @@ def _diagnosed(
         )
     wanted = gain and apart and not cautious
     whole, folds = _WHOLE if wanted else 0.48, THRESHOLDS.count("folds")
-    work = partial(_one_fold, dataset=dataset, seed=seed, only=only, settled=settled, budget=used.part(folds))
-    with process_pool(workers) if wanted and workers > 1 else nullcontext() as pool:
+    work = partial(
+        _one_fold,
+        dataset=dataset,
+        seed=seed,
+        only=only,
+        settled=settled,
+        budget=used.part(folds),
+        simulation=simulation,
+    )
+    several = wanted and workers > 1 and (judged is None or judged.given is None)
+    with process_pool(workers) if several else nullcontext() as pool:
         # the first part is fitted beside the whole, which takes longer: the other cores would be idle until it is known
         # whether anything is measured
         ahead = pool.submit(work, 0, THRESHOLD) if pool and only is None else None
@@ -102,7 +121,7 @@ def _diagnosed(
         null = plain_model(plant_of(dataset, steps), only, settled)
         step("look for causes", whole, 2.0 * whole)
         rests = not is_spent()
-        if only is not None or cautious or not rests:
+        if only is not None or cautious or not rests or simulation is not None:
             found = analyse(null, only=only, seed=seed, cautious=cautious or not rests)
         else:
             as_recorded = dataset
@@ -110,14 +129,19 @@ def _diagnosed(
             units = joined([*units, *turned])
             if dataset is not as_recorded or no_cause != settled:
                 ahead, work = None, partial(work, dataset=dataset, settled=no_cause)
-        doubts = doubts_of(found) if only is None and rests else []
+        by_file = only is None and simulation is None
+        doubts = doubts_of(found, simulation is not None) if only is None and rests else []
         share = used.part(folds)
         worth = Worth()
         if wanted and not is_spent():
             worth = _cross_validated(dataset, found, bool(doubts), seed, partial(work, budget=share), pool, ahead)
     lines = warnings + used.said(nothing=not rests) + list(worth.told)
     lines += [text for text, _ in standing(dataset).values()] + _of_depth(dataset, null.plant) + doubts
-    lines += own_propeller(found) + left_out(found.selection.null.plant, dataset.runs) + misread.said(found.misread)
+    lines += (
+        (own_propeller(found) if by_file else [])
+        + left_out(found.selection.null.plant, dataset.runs)
+        + misread.said(found.misread)
+    )
     causes = describe_causes(
         found, units, ready.late, worth.gain, worth.own if worth.hull else None, bool(doubts),
         [r.id for r in dataset.runs],
@@ -131,17 +155,18 @@ def _diagnosed(
     behind = _behind_its_record(found, causes)
     lines += [f"{name}: {text}" for name, text in behind.items()]
     lines += what_is_left(found) if causes and not doubts else []
-    lines += odd_for(found, [c.effect for c in causes]) if only is None and not doubts else []
+    lines += odd_for(found, [c.effect for c in causes]) if by_file and not doubts else []
     step("predict every run", 0.96, 1.0)
-    trace = trace_of(dataset, found)
+    correction, rollouts = (None, None) if simulation is None else _of_simulation(dataset, simulation, found)
+    trace = trace_of(dataset, found, rollouts)
     unknown = (bool(doubts) and not causes) or (found.unknown is not None and not units)
     verdict = "unknown" if unknown else "found" if causes else "none"
-    own = worth.calibration or (on_fitted_runs(dataset, found.selection.null, seed) if rests else None)
+    own = worth.calibration or (_on_fitted(dataset, simulation, found, seed) if rests else None)
     if own is not None:
-        floor = noise_floor(dataset, found.selection.null, seed)
-        own = replace(own, moved=moved(found.selection.null if unknown else found.final, causes), noise_floor=floor)
+        differs = moved(found.selection.null if unknown else found.final, causes) if simulation is None else ()
+        own = replace(own, moved=differs, noise_floor=noise_floor(dataset, found.selection.null, seed))
     gained = worth.own if worth.hull and len(causes) == 1 else worth.gain
-    proposed = _proposed([c.effect for c in causes if c.effect not in behind], own)
+    proposed = _proposed([c.effect for c in causes if c.effect not in behind], own) if judged is None else judged.text
     return Diagnosis(
         dataset=dataset.name, verdict=verdict, causes=tuple(causes),
         candidates=tuple(describe_candidates(found, [c.effect for c in causes], worth.own is not None)),
@@ -150,7 +175,7 @@ def _diagnosed(
         extended_model=proposed, fingerprint=fingerprint, seconds=time.perf_counter() - began,
         warnings=tuple(lines), gain=gained if causes else None, unknown=unknown_part(found),
         gain_per_run=worth.per_run if causes else (), trace=trace,
-        calibration=own,
+        calibration=own, simulation="" if judged is None else judged.text, correction=correction,
     )  # fmt: skip
 
 
@@ -185,6 +210,26 @@ def _proposed(causes: Sequence[str], calibration: Calibrated | None) -> str:
     names = [name for name, t in traits.items() if not t.describes_data and t.search != "hull"]
     pays = calibration is not None and calibration.after < calibration.before
     return "+".join(["calibrated", *names]) if names or pays else "physics"
+
+
+def _corrected_by(found: Analysis) -> tuple[str, ...]:
+    """Causes that the correction of a simulation holds; none where an unknown one is reported."""
+    return () if found.unknown is not None else correctable([t.effect.name for t in found.final.model.terms])
+
+
+def _of_simulation(
+    dataset: Dataset, simulation: OwnSimulation, found: Analysis
+) -> tuple[Correction, tuple[np.ndarray, np.ndarray]]:
+    """Correction of a simulation by all runs, and its rollouts without and with it."""
+    correction = Correction.fit(dataset, _corrected_by(found))
+    return correction, (simulation.alone(dataset).motion, simulation.corrected(dataset, correction).motion)
+
+
+def _on_fitted(dataset: Dataset, simulation: OwnSimulation | None, found: Analysis, seed: int) -> Calibrated:
+    """Errors before and after the ship's own coefficients are calibrated, on the runs that were fitted."""
+    if simulation is not None:
+        return simulation_on_fitted_runs(dataset, simulation, seed)
+    return on_fitted_runs(dataset, found.selection.null, seed)
 
 
 def _as_it_must_be_read(
@@ -244,15 +289,21 @@ def _one_fold(
     only: Sequence[str] | None,
     settled: Sequence[str],
     budget: Budget,
+    simulation: OwnSimulation | None = None,
 ) -> FoldErrors:
     """Selection (none where the threshold is None) and fits on the training part of one fold, within a part of the
     budget of the whole."""
     test = _folds(dataset, seed)[fold]
-    train = [r for i, r in enumerate(dataset.runs) if i not in set(test.tolist())]
-    plant = plant_of(dataset.with_runs(train), FOLD_STEPS)
+    train = dataset.with_runs(r for i, r in enumerate(dataset.runs) if i not in set(test.tolist()))
+    if simulation is not None:
+        simulation, train = simulation.of_training(dataset, train)
+    plant = plant_of(train, FOLD_STEPS)
     with limited(Budget(budget.iterations, budget.seconds, budget.gigabytes)) as used:
         null = plain_model(plant, only, settled)
         final, gears = (null, {}) if threshold is None else causes_of(null, threshold, only)
+        if simulation is not None:
+            causes = correctable([t.effect.name for t in final.model.terms])
+            return replace(simulation_fold_errors(dataset, test, simulation, train, causes), stopped=used.is_spent)
         return replace(fold_errors(dataset, test, null, final, gears), stopped=used.is_spent)
 
 

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..names import brief
+
+if TYPE_CHECKING:
+    from ..predictors.physics_model.correction import Correction
 
 SCHEMA = 1
 
@@ -66,7 +69,8 @@ class Calibrated:
 class Gain:
     """Error of open-loop rollouts on held-out runs, before and after the model is extended.
 
-    relative: 1 - after/before of the means; ci95: its interval, clustered by run; runs_better: such as "19/24".
+    relative: 1 - after/before of the means; ci95: its interval, clustered by run; runs_better: such as "19/24";
+    after_ci95: interval of `after`.
     """
 
     metric: str
@@ -75,6 +79,7 @@ class Gain:
     relative: float
     ci95: tuple[float, float]
     runs_better: str
+    after_ci95: tuple[float, float] = (np.nan, np.nan)
 
 
 @dataclass(frozen=True)
@@ -178,6 +183,8 @@ class Diagnosis:
     """Verdict and its evidence; `document` is the content of `diagnosis.json`.
 
     spec: name of the data set in commands, a folder or name[key=value]; "" where that is its own name.
+    simulation: spec of the simulation that was judged in place of the ship file's physics, or "". correction: what
+    corrects it.
     """
 
     dataset: str
@@ -196,6 +203,8 @@ class Diagnosis:
     trace: Trace | None = None
     spec: str = ""
     calibration: Calibrated | None = None
+    simulation: str = ""
+    correction: Correction | None = None
 
     def __repr__(self) -> str:
         return brief(f"<Diagnosis of {self.dataset}: {self.verdict}, {self.extended_model}>")
@@ -205,7 +214,8 @@ class Diagnosis:
         (channel and variable) where that is the verdict. `base_model` is the one that the proposed model is compared
         with."""
         return {
-            "schema": SCHEMA, "dataset": self.dataset, "base_model": "physics", "verdict": self.verdict,
+            "schema": SCHEMA, "dataset": self.dataset, "base_model": self.simulation or "physics",
+            "verdict": self.verdict,
             "causes": [_plain(asdict(c)) for c in self.causes],
             "candidates": [_plain(asdict(c)) for c in self.candidates],
             "what_is_wrong": [_plain(asdict(w)) for w in self.what_is_wrong],

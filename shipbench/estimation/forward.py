@@ -22,6 +22,8 @@ from .resampling import averaged
 from .rollout import Active, Course, Vessel
 from .thresholds import THRESHOLDS
 
+PUSHES = ("push_u", "push_v", "push_r")
+"""Channels of a known acceleration [m/s^2, m/s^2, rad/s^2] that acts beside the model, held over a sample."""
 NO_GEAR = Gear(1e-3, 1e12)
 SEGMENT = THRESHOLDS.value("segment_length")
 MOST_STEPS = THRESHOLDS.count("most_steps")
@@ -57,7 +59,7 @@ class Segments:
     earlier (B, P, 4): commands before the segment (the first one, before the run); empty where actuators are recorded.
     kinds: manoeuvre by run, "" where not given. seen (6,): which motion channels were measured. depth (B,): mean
     recorded depth [m]; None where none is recorded, in deep water, or where it is less than the draught. working: names
-    of the actuators that work in any run.
+    of the actuators that work in any run. known (B, K + 1, 3): acceleration of the channels `PUSHES`, or None.
     """
 
     dt: float
@@ -74,6 +76,7 @@ class Segments:
     seen: np.ndarray = field(default_factory=lambda: np.ones(6, dtype=bool))
     depth: np.ndarray | None = None
     working: frozenset[str] = frozenset(STATES[ACTUATORS])
+    known: np.ndarray | None = None
 
     def thinned(self, most: int) -> Segments:
         """Segments evenly spread, at most `most`; every run keeps at least one."""
@@ -90,11 +93,11 @@ class Segments:
         return replace(found, run=run, runs=len(runs), kinds=tuple(self.kinds[i] for i in runs))
 
     def _of(self, rows: np.ndarray) -> Segments:
-        wind, depth = (None if v is None else v[rows] for v in (self.wind, self.depth))
+        wind, depth, known = (None if v is None else v[rows] for v in (self.wind, self.depth, self.known))
         return replace(
             self, states=self.states[rows], commands=self.commands[rows], earlier=self.earlier[rows], wind=wind,
             mask=self.mask[rows],
-            run=self.run[rows], start=self.start[rows], depth=depth,
+            run=self.run[rows], start=self.start[rows], depth=depth, known=known,
         )  # fmt: skip
 
     def without(self, pieces: np.ndarray) -> Segments:
@@ -118,10 +121,9 @@ def cut(dataset: Dataset, steps: int, still: Collection[str] = ()) -> Segments:
         edges = np.linspace(0, len(run) - 1, num + 1).round().astype(int)
         pieces += [(index, run, a, b) for a, b in pairwise(edges)]
     K = max(b - a for _, _, a, b in pieces)
-    wind_columns = (
-        [dataset.inputs.index(n) for n in ("wind_speed", "wind_from")]
-        if {"wind_speed", "wind_from"} <= set(dataset.inputs)
-        else None
+    wind_columns, pushed = (
+        [dataset.inputs.index(n) for n in names] if set(names) <= set(dataset.inputs) else None
+        for names in (("wind_speed", "wind_from"), PUSHES)
     )
     at = [np.minimum(np.arange(a, a + K + 1), b) for _, _, a, b in pieces]
     states = np.stack([run.states[i] for (_, run, _, _), i in zip(pieces, at, strict=True)])
@@ -142,6 +144,7 @@ def cut(dataset: Dataset, steps: int, still: Collection[str] = ()) -> Segments:
         run=np.array([p[0] for p in pieces]), start=np.array([p[2] * dataset.dt for p in pieces]), runs=len(dataset),
         kinds=tuple(run.kind for run in dataset.runs),
         seen=~np.isin(STATES[MOTION], dataset.derived), depth=depth, working=working(dataset) - set(still),
+        known=None if pushed is None else inputs[..., pushed],
     )  # fmt: skip
 
 
@@ -238,7 +241,7 @@ class Plant:
         return plant
 
     def thinned(self, most: int) -> Plant:
-        """Forward model of at most `most` of its segments, evenly spread; every run keeps at least one."""
+        """Forward model of `Segments.thinned`."""
         if len(self.seg.run) <= most:
             return self
         return Plant(self.ship, self.seg.thinned(most), self.long, self.ordinary, recorded=self.recorded)
@@ -248,8 +251,7 @@ class Plant:
         return Plant(self.ship, self.seg.where(wanted), self.long, self.ordinary, self.froude)
 
     def resized(self, factor: float) -> Plant:
-        """Return the same runs of a geometrically similar ship. Segments, latent force and units stay, so that evidence
-        compares."""
+        """Return the same runs of a geometrically similar ship, with the same units, so that evidence compares."""
         return Plant(self.ship.resized(factor), self.seg, self.long, froude=self.froude)
 
     def turned(self, actuators: Sequence[int]) -> Plant:
@@ -337,8 +339,7 @@ class Plant:
         w: np.ndarray,
         path: np.ndarray | None = None,
     ) -> np.ndarray:
-        """Motion (B, K + 1, 6) from x0 (B, 6), with parameters p0..p10, effects, and a latent acceleration w (B, K + 1,
-        3) at the samples."""
+        """Motion (B, K + 1, 6) from x0 (B, 6), with p0..p10, effects, and a latent acceleration w (B, K + 1, 3)."""
         return self.course.rolled(x0, p, [*active, *self.water], self._by_sample(path), self.pushes(w))
 
     def steps_from(
@@ -374,10 +375,12 @@ class Plant:
         return self._by_sample(path)[at], self.course.t[at]
 
     def pushes(self, w: np.ndarray) -> np.ndarray:
-        """The latent acceleration w (B, K + 1, 3) at the stages of every integration step, (K, B, substeps, 3, 3)."""
+        """The latent acceleration w (B, K + 1, 3) and the known one at the stages, (K, B, substeps, 3, 3)."""
         part = self.parts[..., None]
         ends = np.swapaxes(w, 0, 1)[:, :, None, None]
-        return (1.0 - part) * ends[:-1] + part * ends[1:]
+        latent = (1.0 - part) * ends[:-1] + part * ends[1:]
+        known = self.seg.known
+        return latent if known is None else latent + np.swapaxes(known[:, :-1], 0, 1)[:, :, None, None]
 
     def _by_sample(self, path: np.ndarray | None) -> np.ndarray:
         """Path by sample (K, B, substeps, 3, 4) from a path (B, steps * substeps, 3, 4)."""

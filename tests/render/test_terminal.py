@@ -23,7 +23,7 @@ from shipbench.leaderboard.board import Board
 from shipbench.leaderboard.pages import build_board
 from shipbench.render.table import Table, TableColumn, number
 from shipbench.render.terminal import command_lines, show_table
-from shipbench.reports.diagnosis.text import summary_lines
+from shipbench.reports.diagnosis.summary import summary_lines
 from shipbench.steps import listening, step, tick, within
 
 WIDTHS = [80, 100, 120]

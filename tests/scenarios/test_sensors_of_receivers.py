@@ -35,7 +35,7 @@ from shipbench.estimation.thresholds import THRESHOLDS
 from shipbench.physics.actuators import gear_path
 from shipbench.physics.mmg import load_mmg_ship
 from shipbench.records import Dataset
-from shipbench.reports.diagnosis.text import summary_lines
+from shipbench.reports.diagnosis.summary import summary_lines
 from shipbench.signals import PSI, R, U, V, X, Y
 from shipbench.simulate.hidden import Hidden
 from shipbench.simulate.published import PUBLISHED, published_trials

@@ -154,7 +154,13 @@ def summarise(before: np.ndarray, after: np.ndarray, seed: int, groups: Sequence
     better = int(np.sum(after < before))
     mean_b, mean_a = float(before.mean()), float(after.mean())
     return Gain(
-        "ED", mean_b, mean_a, 1.0 - mean_a / max(mean_b, 1e-12), (float(low), float(high)), f"{better}/{len(before)}"
+        "ED",
+        mean_b,
+        mean_a,
+        1.0 - mean_a / max(mean_b, 1e-12),
+        (float(low), float(high)),
+        f"{better}/{len(before)}",
+        mean_interval(after, seed, groups),
     )
 
 

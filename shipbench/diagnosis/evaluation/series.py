@@ -14,15 +14,18 @@ from ..selection.analysis import Analysis
 from .held_out_gain import horizon, recorded_gears
 
 
-def trace_of(dataset: Dataset, found: Analysis) -> Trace:
+def trace_of(dataset: Dataset, found: Analysis, rollouts: tuple[np.ndarray, np.ndarray] | None = None) -> Trace:
     """Trace of open-loop rollouts of the calibrated ship without and with the causes, fitted to all runs (the gain is
-    held out, these plots are not), and of latent forces before and after."""
+    held out, these plots are not), and of latent forces before and after.
+
+    rollouts: motions (B, K + 1, 6) of a simulation without and with its correction, which are shown instead.
+    """
     null, final, changed = found.selection.null, found.final, found.changed_gears
     gears, seconds = recorded_gears(dataset, null), horizon(dataset.ship.L)
     plain = rollout_plant(dataset, gears, seconds)
-    before = distance(plain, Scales(plain), calibration_of(null))[1]
-    after = before
-    if found.unknown is None and (final.model.terms or changed):
+    before = distance(plain, Scales(plain), calibration_of(null))[1] if rollouts is None else rollouts[0]
+    after = before if rollouts is None else rollouts[1]
+    if rollouts is None and found.unknown is None and (final.model.terms or changed):
         driven = rollout_plant(dataset, gears | changed, seconds)
         after = distance(driven, Scales(driven), calibration_of(final))[1]
     seg = plain.seg

@@ -16,11 +16,15 @@ from .agreement import shows_on_any_ship
 from .analysis import Analysis
 from .other_size import better_size, size_instead_of
 
+_OF_SIMULATION = (
+    "Is the simulation of this ship, with her units and signs? It differs from the runs by more than the coefficients "
+    "of ordinary ships do from each other."
+)
 _QUESTION = "Is the ship file that of this ship (L, B, T, displacement, propeller, rudder, units)?"
 
 
-def doubts_of(found: Analysis) -> list[str]:
-    """Warning on signs that the model does not belong to the data.
+def doubts_of(found: Analysis, of_simulation: bool = False) -> list[str]:
+    """Warning on signs that the model does not belong to the data: the ship file's, or a simulation of the user's own.
 
     Signs: the fit lies outside the prior between ships, hull or propeller would be another ship's, a ship of quite
     another size explains the runs better, or one of nearly the same size does as well as the causes while the fit is an
@@ -40,18 +44,26 @@ def doubts_of(found: Analysis) -> list[str]:
     for term, value in zip(fit.model.terms, fit.values, strict=True):
         if term.effect.family in ("hull", "propulsion") and np.max(np.abs(value)) > STRANGE_SIZE:
             signs.append(f"{term.label} would have to be {np.max(np.abs(value)):.1f} times its typical size")
-    if not signs and np.sum(z**2) > THRESHOLDS.value("huber_knee") ** 2:
-        signs = better_size(found.selection.plain)
-    if not signs and _is_odd(z) and (size := _size_instead(found, [term.label for term in fit.model.terms])):
-        signs = [_moved(z), *size]
+    if not signs and not of_simulation:
+        signs = _signs_of_size(found, z)
     if not signs:
         return []
+    question = _OF_SIMULATION if of_simulation else _QUESTION
     return [
-        f"{'; '.join(signs)}. {_QUESTION} Until that is sure, only causes that do not depend on it are named. "
+        f"{'; '.join(signs)}. {question} Until that is sure, only causes that do not depend on it are named. "
         "These are errors of sensors, delay and play of actuators in their own record, actuators too slow for any "
         "ship, and forces that break the symmetry of port and starboard or depend on an earth-fixed direction. "
-        "The candidates below are ranked as if the file were right."
+        f"The candidates below are ranked as if the {'simulation' if of_simulation else 'file'} were right."
     ]
+
+
+def _signs_of_size(found: Analysis, z: np.ndarray) -> list[str]:
+    """Signs that a ship of another size sailed."""
+    if np.sum(z**2) > THRESHOLDS.value("huber_knee") ** 2 and (signs := better_size(found.selection.plain)):
+        return signs
+    fit = found.final if found.unknown is None else found.selection.null
+    size = _size_instead(found, [term.label for term in fit.model.terms]) if _is_odd(z) else []
+    return [_moved(z), *size] if size else []
 
 
 def odd_for(found: Analysis, named: Sequence[str]) -> list[str]:

@@ -16,8 +16,6 @@ from ...signals import ACTUATORS, F_B, F_S, STATES
 from ..recorded import RUNS, thinned
 from .text import figure
 
-MODELS = ("calibrated ship", "extended model")
-"""Names of model 0 and model 1."""
 FITS = [STATES[i] for i in FITTED]
 _SAMPLES = 25_000
 """Time steps of all runs of one page together: some 2.5 MB, beside Plotly's 1.2 MB."""
@@ -76,7 +74,7 @@ def chosen_segments(trace: Trace, extended: bool) -> list[int]:
     return [b for b in order if b in kept]
 
 
-def rollout_plots(trace: Trace, extended: bool) -> dict[str, Any]:
+def rollout_plots(trace: Trace, extended: bool, models: tuple[str, str]) -> dict[str, Any]:
     """Tracks and time histories of the chosen segments; the one with the greatest error is shown first."""
     segments = chosen_segments(trace, extended)
     predictions = rollouts(trace, extended)
@@ -103,7 +101,7 @@ def rollout_plots(trace: Trace, extended: bool) -> dict[str, Any]:
                 _name(trace, b), " to ".join(_error(e[b]) for e in errors), trace.t[kept], columns, lines, cells=cells
             )
         )
-    names = [Line("measured", "measured"), *(Line(MODELS[i], i) for i in range(len(predictions)))]
+    names = [Line("measured", "measured"), *(Line(name, i) for i, name in enumerate(models[: len(predictions)]))]
     return linked_plots(columns, names, [ERROR.name, *(q.name for _, _, q in signals)], runs, ("east", "north"))
 
 

@@ -18,11 +18,13 @@ from ...render.table import table_cells
 from ..recorded import RUNS
 from . import evidence as svg
 from . import tables as tables
-from .linked import FITS, MODELS, changed, position_errors, rollout_plots, rollouts
+from .linked import FITS, changed, position_errors, rollout_plots, rollouts
 from .remains import remaining_sentences
 from .text import (
     added,
+    baseline,
     calibration_words,
+    drawn,
     estimate,
     figure,
     force_words,
@@ -57,7 +59,9 @@ def diagnosis_page(d: Diagnosis) -> str:
     """HTML of a diagnosis; it needs no network and no other file."""
     return render_page(
         "diagnosis.html.j2", title=f"Diagnosis: {d.dataset}", dataset=d.dataset,
-        command=f"shipbench diagnose {shlex.quote(d.spec or d.dataset)}",
+        command=f"shipbench diagnose {shlex.quote(d.spec or d.dataset)}"
+        + (f" --model {shlex.quote(d.simulation)}" if d.simulation else ""),
+        judged=drawn(d)[0] if d.simulation else "calibrated ship",
         lead=f"{headline(d)} {calibration_words(d)}".strip(), tiles=_tiles(d),
         plots=d.trace is not None, style=_STYLE,
         warnings=d.warnings, causes=[_cause(c, d) for c in d.causes], instead=_no_cause(d), gain=_gain_of_all(d),
@@ -98,7 +102,11 @@ def _verdict(d: Diagnosis) -> Tile:
 def _error(d: Diagnosis) -> Tile:
     """Tile of the held-out errors of ship file, calibrated ship and extended model, or of their absence."""
     own = d.calibration if d.calibration is not None and d.calibration.held_out else None
-    values, names = ([own.before, own.after], ["ship file", "calibrated"]) if own else ([], [])
+    values, names = (
+        ([own.before, own.after], ["your simulation" if d.simulation else "ship file", "calibrated"])
+        if own
+        else ([], [])
+    )
     if d.gain is not None and added(d):
         values, names = [*(values or [d.gain.before]), d.gain.after], [*(names or ["calibrated"]), "with the causes"]
     if values:
@@ -113,8 +121,12 @@ def _error(d: Diagnosis) -> Tile:
     return Tile(
         "Held-out position error",
         "not measured",
-        "on the runs of the fit: " + " to ".join(means) + (", calibrated ship to extended model" * (len(means) > 1)),
+        "on the runs of the fit: " + " to ".join(means) + (f", {' to '.join(drawn(d))}" * (len(means) > 1)),
     )
+
+
+def _file_or_own(d: Diagnosis) -> str:
+    return "your simulation" if d.simulation else "ship file"
 
 
 def _sureness(d: Diagnosis) -> Tile:
@@ -150,7 +162,8 @@ def _cause(c: Cause, d: Diagnosis) -> dict[str, Any]:
         "sizes": [estimate(c.effect, name, e) for name, e in c.parameters.items()],
         "force": _capital(force) + "." if force else "", "strength": _capital(strength(c)) + ".",
         "evidence": c.evidence,
-        "gain": gain_words(own, c) if (own := own_gain(c, d)) is not None else "", "line": _lines(c.correction),
+        "gain": gain_words(own, c, whole=baseline(d)) if (own := own_gain(c, d)) is not None else "",
+        "line": _lines(c.correction),
         "rivals": c.confused_with,
         "trial": _capital(c.separating_manoeuvre.rstrip(".")) + "." if c.separating_manoeuvre else "",
     }  # fmt: skip
@@ -165,7 +178,7 @@ def _gain_of_all(d: Diagnosis) -> str:
     """Text of the gain of several causes together, or that none was measured; that of a single cause stands beside
     it."""
     several = added(d)
-    return gain_words(d.gain, *several) if d.causes and (d.gain is None or len(several) > 1) else ""
+    return gain_words(d.gain, *several, whole=baseline(d)) if d.causes and (d.gain is None or len(several) > 1) else ""
 
 
 def _no_cause(d: Diagnosis) -> str:
@@ -195,10 +208,10 @@ def _evidence(d: Diagnosis) -> dict[str, Any]:
     missing = svg.missing_forces(trace, found, extended, tables.LEVEL)
     if d.unknown and d.unknown["variable"] == "position":
         missing += svg.over_places(trace, d.unknown["axis"].split(" and "))
-    plots = rollout_plots(trace, extended)
+    plots = rollout_plots(trace, extended, drawn(d))
     return {
-        "traced": True, "models": [switch(i, MODELS[i]) for i in range(2 if extended else 1)],
-        "tracks": plots, "fits": FITS, "which": _which(len(plots["runs"]), len(trace.run), trace.held_out),
+        "traced": True, "models": [switch(i, name) for i, name in enumerate(drawn(d)[: 2 if extended else 1])],
+        "tracks": plots, "fits": FITS, "which": _which(len(plots["runs"]), len(trace.run), trace.held_out, drawn(d)[0]),
         "growth": svg.error_growth(trace, extended), "slices": svg.error_slices(trace, extended), "missing": missing,
         "by_chance": tables.independent(found), "channels": table_cells(tables.channels(trace, found, extended)),
         "dependences": table_cells(tables.dependences(found)),
@@ -208,7 +221,7 @@ def _evidence(d: Diagnosis) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _which(drawn: int, total: int, held_out: bool) -> str:
+def _which(drawn: int, total: int, held_out: bool, first: str) -> str:
     some = (
         f"{drawn} of {total} predictions are drawn (at most {RUNS} on a page), evenly spread"
         if drawn < total
@@ -217,7 +230,7 @@ def _which(drawn: int, total: int, held_out: bool) -> str:
     fitted = (
         "No model was fitted to the runs that it predicts." if held_out else "Here the models are fitted to all runs."
     )
-    return f"{some}, from the greatest error of the calibrated ship to the least. {fitted}"
+    return f"{some}, from the greatest error of the {first.removeprefix('your ')} to the least. {fitted}"
 
 
 def _worst(runs: Sequence[tuple[str, float]], listed: int = 5) -> str:

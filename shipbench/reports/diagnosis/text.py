@@ -8,9 +8,7 @@ import shlex
 from ...diagnosis.result import Candidate, Cause, Diagnosis, Estimate, Gain, NoiseFloor, what_it_is
 from ...effects.base import EFFECTS, Effect, Parameter
 from ...render.table import display_unit
-from ...render.terminal import command_lines, paragraph
 
-_SHOWN = 10
 WIDTH = 80
 """Columns of summary.txt."""
 DETECTION_LIMIT = 'Detection limit: the smallest effect these runs could have shown ("-": cannot be detected)'
@@ -139,13 +137,14 @@ def own_gain(c: Cause, d: Diagnosis) -> Gain | None:
     return c.gain if _of_ship(c) else d.gain if len(added(d)) == 1 else None
 
 
-def gain_words(g: Gain | None, *causes: Cause) -> str:
-    """Text of the gain of causes together on held-out runs: beside the calibrated ship, or of calibrating her."""
+def gain_words(g: Gain | None, *causes: Cause, whole: str = "the calibrated ship") -> str:
+    """Text of the gain of causes together on held-out runs: beside the calibrated ship (`whole`), or of calibrating
+    her."""
     if g is None:
         return "The gain on held-out runs was not measured."
     low, high = g.ci95
     all_of_them = "it" if len(causes) == 1 else "both" if len(causes) == 2 else f"all {len(causes)}"
-    whose = "" if any(map(_of_ship, causes)) else " of the calibrated ship"
+    whose = "" if any(map(_of_ship, causes)) else f" of {whole}"
     doubt = "" if low > 0 else " This may be no gain at all." if high > 0 else " The extended model is worse."
     return (
         f"With {'them' if not whose else all_of_them}, the {_METRICS.get(g.metric, g.metric)}{whose} on held-out runs "
@@ -173,7 +172,7 @@ def headline(d: Diagnosis) -> str:
         found = f"{', '.join(first)}, and {last}" if first else last
         if not added(d):
             return f"Found: only {found}."
-        return f"Found: {found}. {gain_words(d.gain, *added(d))}"
+        return f"Found: {found}. {gain_words(d.gain, *added(d), whole=baseline(d))}"
     if d.verdict == "unknown" and d.unknown:
         return (
             f"The model lacks something that is not in the library: {what_it_is(d.unknown)}. "
@@ -197,10 +196,12 @@ def calibration_words(d: Diagnosis) -> str:
         return ""
     c = d.calibration
     where = "held-out runs" if c.held_out else "the runs that were fitted"
+    model = f"your simulation {d.simulation}" if d.simulation else "the ship file's model"
     return (
-        f"In open-loop rollouts of at most {c.seconds:.0f} s on {where}, the ship file's model is {figure(c.before)} m "
-        f"off on average. With the ship's own coefficients calibrated it is {figure(c.after)} m off "
+        f"In open-loop rollouts of at most {c.seconds:.0f} s on {where}, {model} is {figure(c.before)} m off on average. "
+        f"With the ship's own coefficients {'corrected' if d.simulation else 'calibrated'} it is {figure(c.after)} m off "
         f"(95 %: {figure(c.ci95[0], 2)} to {figure(c.ci95[1], 2)} m)."
+        + (_with_causes(d) if d.simulation else "")
         + (f" {floor_words(c.noise_floor)}" if c.noise_floor is not None else "")
         + "".join(
             f" The calibrated ship's {m.coefficient} is {_changed(m.change)} than the ship file's "
@@ -218,12 +219,32 @@ def floor_words(floor: NoiseFloor) -> str:
     )
 
 
-def next_command(d: Diagnosis) -> str:
-    """Command that compares `physics`, the calibrated ship and the proposed model on held-out runs; "" where `physics`
-    is proposed."""
-    if d.extended_model == "physics":
+def _with_causes(d: Diagnosis) -> str:
+    """Error of a simulation with the causes, on held-out runs."""
+    if d.gain is None or not added(d):
         return ""
-    models = dict.fromkeys(["physics", d.extended_model.split("+")[0], d.extended_model])
+    low, high = d.gain.after_ci95
+    named = " and ".join(in_words(c) for c in added(d))
+    return f" With {named} as well it is {figure(d.gain.after)} m off (95 %: {figure(low, 2)} to {figure(high, 2)} m)."
+
+
+def baseline(d: Diagnosis) -> str:
+    """Words for the model beside which the causes are judged."""
+    return "your simulation with the ship's own coefficients" if d.simulation else "the calibrated ship"
+
+
+def drawn(d: Diagnosis) -> tuple[str, str]:
+    """Names of the two models whose predictions are drawn."""
+    return ("your simulation", "corrected simulation") if d.simulation else ("calibrated ship", "extended model")
+
+
+def next_command(d: Diagnosis) -> str:
+    """Command that compares `physics` or the simulation, the calibrated ship and the proposed model on held-out runs;
+    "" where nothing else is proposed."""
+    if d.extended_model in ("physics", d.simulation):
+        return ""
+    first = [d.simulation] if d.simulation else ["physics", d.extended_model.split("+")[0]]
+    models = dict.fromkeys([*first, d.extended_model])
     named = " ".join(f"--model {shlex.quote(m)}" for m in models)
     return f"shipbench run {named} --dataset {shlex.quote(d.spec or d.dataset)}"
 
@@ -296,87 +317,3 @@ def cause_texts(c: Cause, alone: Gain | None = None) -> list[str]:
         texts.append(f"These data cannot separate it from {', '.join(c.confused_with)}.")
         texts += [f"A trial that can: {c.separating_manoeuvre.rstrip('.')}."] if c.separating_manoeuvre else []
     return texts + ([f"To correct the record, write in dataset.toml: {c.correction}"] if c.correction else [])
-
-
-def cause_lines(c: Cause, width: int = WIDTH, alone: Gain | None = None) -> list[str]:
-    """Lines on a cause: sizes, force, evidence and the causes it is confounded with; alone: its own gain."""
-    part = _effect(c.effect)
-    lines = paragraph(f"{c.rank}. {c.effect}" + (f": {part.summary}" if part else ""), width, "  ", " " * 5)
-    for name, e in c.parameters.items():
-        lines += paragraph(estimate(c.effect, name, e), width, " " * 7, " " * 9)
-    for text in cause_texts(c, alone):
-        lines += paragraph(text, width, " " * 5)
-    return lines
-
-
-def _candidate_lines(d: Diagnosis, width: int) -> list[str]:
-    shown = d.candidates[:_SHOWN]
-    if not shown:
-        return []
-    wide = max(len(c.effect) for c in shown)
-    lines = [f"Candidates (best {len(shown)} of {len(d.candidates)}):", f"  {'effect':<{wide}s}     score  result"]
-    for c in shown:
-        score = f"{c.score:8.1f}" if math.isfinite(c.score) else "       -"
-        lines += paragraph(f"{c.effect:<{wide}s}  {score}  {c.rejected_because}", width, "  ", " " * (wide + 14))
-    return [*lines, ""]
-
-
-def _detectable_lines(d: Diagnosis, width: int) -> list[str]:
-    """Lines of detection limits: all where nothing was identified; else those of the best other candidates."""
-    kept = (
-        sorted(d.candidates, key=lambda c: c.effect)
-        if d.verdict == "none"
-        else [c for c in d.candidates[:_SHOWN] if c.rejected_because != "named"]
-    )
-    kept = [c for c in kept if c.detectable]
-    if not kept:
-        return []
-    wide = max(len(c.effect) for c in kept)
-    lines = paragraph(DETECTION_LIMIT + ":", width)
-    for c in kept:
-        lines += paragraph(f"{c.effect:<{wide}s}  {detectable(c)}", width, "  ", " " * (wide + 4))
-    return [*lines, ""]
-
-
-def _wrong_lines(d: Diagnosis, width: int) -> list[str]:
-    """Lines on the error of the baseline model in each channel, and on the noise model."""
-    lines = ["What the calibrated ship gets wrong:"] if d.what_is_wrong else []
-    for w in d.what_is_wrong:
-        none = "its missing force shows no dependence on motion, actuators or time alone"
-        when = w.when if w.depends_on else f"{w.when}; {none}".removeprefix("; ")
-        lines += paragraph(f"{w.channel}, {100 * w.share_of_error:.0f} % of the error: {when}", width, "  ", "      ")
-    lines += [""] if lines else []
-    if noise := d.unexplained_after.get("taken_as_noise"):
-        lines.append("Treated as noise:")
-        for channel, words in noise.items():
-            lines += paragraph(f"{channel}: {words}", width, "  ", "      ")
-        lines.append("")
-    return lines
-
-
-def summary_lines(d: Diagnosis, width: int = WIDTH, full: bool = True) -> list[str]:
-    """Diagnosis as plain lines of at most `width` columns.
-
-    Args:
-        full: with the errors of the baseline model, the candidates and the detection limits; else the verdict, its
-            causes and the next command.
-    """
-    lines = [*paragraph(f"Diagnosis of {d.dataset} ({d.seconds:.0f} s)", width), "", *paragraph(headline(d), width), ""]
-    if calibration := calibration_words(d):
-        lines += [*paragraph(calibration, width), ""]
-    for warning in d.warnings:
-        lines += paragraph(f"WARNING: {warning}", width, "", " " * 9)
-    if d.warnings:
-        lines.append("")
-    if d.causes:
-        lines.append("Causes:")
-        for c in d.causes:
-            lines += cause_lines(c, width, own_gain(c, d))
-        lines.append("")
-    if full:
-        lines += _wrong_lines(d, width) + _candidate_lines(d, width) + _detectable_lines(d, width)
-    if command := next_command(d):
-        lines += [*paragraph(f"Model to compare: {d.extended_model}", width), *command_lines(command, width)]
-    if not full:
-        lines += ["", "All tables (errors by channel, candidates, detection limits): --full"]
-    return lines

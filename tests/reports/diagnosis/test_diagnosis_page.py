@@ -18,7 +18,8 @@ from shipbench.diagnosis.result import Calibrated, Candidate, Diagnosis, Estimat
 from shipbench.reports.diagnosis.files import write_diagnosis, write_report
 from shipbench.reports.diagnosis.linked import changed, chosen_segments, fits, position_errors
 from shipbench.reports.diagnosis.page import diagnosis_page as page
-from shipbench.reports.diagnosis.text import WIDTH, gain_words, headline, summary_lines
+from shipbench.reports.diagnosis.summary import summary_lines
+from shipbench.reports.diagnosis.text import WIDTH, gain_words, headline
 
 
 def in_words(d: Diagnosis) -> Diagnosis:

@@ -8,16 +8,15 @@ from made_diagnosis import CAUSE, GAIN, make_diagnosis
 
 from shipbench.diagnosis.result import Calibrated, Cause, Estimate, Moved, NoiseFloor
 from shipbench.effects.base import EFFECTS
+from shipbench.reports.diagnosis.summary import cause_lines, summary_lines
 from shipbench.reports.diagnosis.text import (
     calibration_words,
-    cause_lines,
     estimate,
     force_words,
     gain_words,
     headline,
     in_words,
     next_command,
-    summary_lines,
 )  # fmt: skip
 
 BANNED = re.compile(

@@ -1,0 +1,141 @@
+"""Errors of a simulation of the user's own, alone and corrected, in open-loop rollouts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ...estimation.forward import PUSHES, Segments, cut
+from ...estimation.resampling import averaged
+from ...predictors.base import make_predictor
+from ...predictors.context import Context, predicted
+from ...predictors.own_simulator import Simulator
+from ...predictors.physics_model.correction import Correction, beside_simulation
+from ...records import Dataset
+from ...signals import MOTION
+from ...specs import Spec
+from ..result import Calibrated
+from .held_out_gain import FoldErrors, horizon, of_runs
+
+
+@dataclass(frozen=True, eq=False)
+class OwnSimulation:
+    """Simulation that a diagnosis judges in place of the ship file's physics.
+
+    Args:
+        spec: of the model, as `shipbench run` takes it.
+        known: the runs by which a model that learns is fitted.
+    """
+
+    spec: Spec
+    known: Dataset
+
+    @cached_property
+    def model(self) -> Any:
+        """The model, fitted where it learns."""
+        model = make_predictor(self.spec)
+        return model if self.spec.saved else model.fit(self.known)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """State without the model, whose code another process loads anew."""
+        return {"spec": self.spec, "known": self.known}
+
+    def beside(self, dataset: Dataset) -> Dataset:
+        """Runs with what the simulation adds to the ship file's physics (`beside_simulation`)."""
+        return beside_simulation(without_pushes(dataset), self.model)
+
+    def of_training(self, dataset: Dataset, train: Dataset) -> tuple[OwnSimulation, Dataset]:
+        """Simulation and `train` as they are where only the runs of `train` are known; `dataset` has all of them."""
+        if self.spec.saved or isinstance(self.model, Simulator):
+            return self, train
+        other = OwnSimulation(self.spec, without_pushes(train))
+        return other, other.beside(train)
+
+    def alone(self, dataset: Dataset) -> Rollouts:
+        """Rollouts of the simulation as it is."""
+        return Rollouts.of(dataset, self, None)
+
+    def corrected(self, dataset: Dataset, correction: Correction) -> Rollouts:
+        """Rollouts of the corrected simulation."""
+        return Rollouts.of(dataset, self, correction)
+
+
+def without_pushes(dataset: Dataset) -> Dataset:
+    """Runs as they were recorded, without the channels of `beside_simulation`."""
+    if PUSHES[0] not in dataset.inputs:
+        return dataset
+    keep = [i for i, name in enumerate(dataset.inputs) if name not in PUSHES]
+    names = tuple(dataset.inputs[i] for i in keep)
+    return dataset.with_runs(replace(r, inputs=r.inputs[:, keep], inputs_names=names) for r in dataset.runs)
+
+
+@dataclass(frozen=True, eq=False)
+class Rollouts:
+    """Open-loop rollouts along the segments `seg` of the averaged record: motion (B, K + 1, 6)."""
+
+    seg: Segments
+    motion: np.ndarray
+
+    @classmethod
+    def of(cls, dataset: Dataset, simulation: OwnSimulation, correction: Correction | None) -> Rollouts:
+        """Rollouts of at most `horizon` seconds from measured states, at the sample time of the record."""
+        plain = without_pushes(dataset)
+        slow = averaged(plain)
+        seg = cut(slow, max(20, round(horizon(dataset.ship.L) / slow.dt)))
+        num = round(slow.dt / plain.dt)
+        first = num // 2 + num * np.round(seg.start / slow.dt).astype(int)
+        steps = num * (seg.states.shape[1] - 1)
+        runs = [plain.runs[i] for i in seg.run]
+        U = np.stack(
+            [r.inputs[np.minimum(np.arange(k, k + steps), len(r) - 1)] for r, k in zip(runs, first, strict=True)]
+        )
+        context = Context(
+            plain.ship, plain.dt, plain.inputs, tuple(r.parent for r in runs),
+            np.array([r.t[k] for r, k in zip(runs, first, strict=True)]), tuple(r.began for r in runs),
+        )  # fmt: skip
+        s0 = seg.states[:, 0]
+        if correction is None:
+            S = np.asarray(predicted(simulation.model, s0.copy(), U.copy(), None, context), dtype=float)
+        else:
+            S = correction.predict(simulation.model, s0, U, plain.dt, context)
+        motion = np.concatenate([s0[:, None, MOTION], S[:, num - 1 :: num, MOTION]], axis=1)
+        return cls(seg, motion)
+
+    @property
+    def errors(self) -> np.ndarray:
+        """Mean ED [m] of every run (N,), without the initial sample."""
+        seg = self.seg
+        with np.errstate(all="ignore"):
+            ed = np.hypot(*np.moveaxis(self.motion[..., :2] - seg.states[..., :2], -1, 0))
+        scored = seg.mask.copy()
+        scored[:, 0] = False
+        ed = np.where(scored, np.nan_to_num(ed, nan=1e6, posinf=1e6), 0.0)
+        total, count = (np.bincount(seg.run, v.sum(axis=1), seg.runs) for v in (ed, scored))
+        return np.asarray(total / np.maximum(count, 1))
+
+
+def simulation_fold_errors(
+    dataset: Dataset, test: np.ndarray, simulation: OwnSimulation, train: Dataset, causes: Sequence[str]
+) -> FoldErrors:
+    """Errors of the held-out runs: of the simulation, with the ship's own coefficients, and with the causes besides.
+
+    Args:
+        test: indices of the held-out runs of `dataset`.
+        train: the other runs, of `beside_simulation`.
+        causes: of the training runs.
+    """
+    held = dataset.subset([int(i) for i in test])
+    alone = simulation.alone(held).errors
+    own = simulation.corrected(held, Correction.fit(train)).errors
+    after = simulation.corrected(held, Correction.fit(train, causes)).errors if causes else own
+    return FoldErrors(test, alone, own, after, alone, own)
+
+
+def simulation_on_fitted_runs(dataset: Dataset, simulation: OwnSimulation, seed: int) -> Calibrated:
+    """Errors of the simulation, alone and with the ship's own coefficients, on the runs that were fitted."""
+    alone, own = simulation.alone(dataset), simulation.corrected(dataset, Correction.fit(dataset))
+    return of_runs(dataset, alone.errors, own.errors, seed, held_out=False)

@@ -1,0 +1,56 @@
+"""Rollouts and errors of a simulation of the user's own, as a diagnosis measures them."""
+
+from __future__ import annotations
+
+import pickle
+
+import numpy as np
+
+from shipbench.diagnosis.evaluation.own_simulation import OwnSimulation, Rollouts, without_pushes
+from shipbench.estimation.forward import PUSHES
+from shipbench.metrics.ed import ed
+from shipbench.specs import parse_spec, spec_of
+
+
+def still(s0, U, dt):
+    return np.repeat(s0[:, None], U.shape[1], axis=1)
+
+
+def test_errors_are_the_mean_ed_of_every_run(harbour):
+    batch = harbour.batch()
+    rollouts = OwnSimulation(spec_of(still), harbour).alone(harbour)
+    expected = ed(true=batch.truth, pred=still(batch.s0, batch.U, 1.0)).mean(axis=1)
+    np.testing.assert_allclose(rollouts.errors, expected)
+    assert rollouts.motion.shape == (len(harbour), 41, 6)
+
+
+def test_a_diverged_rollout_counts_as_a_large_error(harbour):
+    def lost(s0, U, dt):
+        return np.full((*U.shape[:2], 10), np.nan)
+
+    assert (Rollouts.of(harbour, OwnSimulation(spec_of(lost), harbour), None).errors > 1e5).all()
+
+
+def test_channels_of_the_simulation_can_be_taken_off_again(harbour):
+    simulation = OwnSimulation(spec_of(still), harbour)
+    beside = simulation.beside(harbour)
+    assert beside.inputs[-3:] == PUSHES
+    assert without_pushes(beside).fingerprint == harbour.fingerprint
+    assert simulation.beside(beside).fingerprint == beside.fingerprint
+
+
+def test_a_model_that_learns_is_fitted_to_the_training_runs_alone(harbour):
+    learns = OwnSimulation(parse_spec("hold"), harbour)
+    train = learns.beside(harbour).subset(range(10))
+    other, runs = learns.of_training(learns.beside(harbour), train)
+    assert len(other.known) == 10
+    assert runs.inputs[-3:] == PUSHES
+    function = OwnSimulation(spec_of(still), harbour)
+    assert function.of_training(harbour, train)[0] is function
+
+
+def test_another_process_makes_the_model_anew(harbour):
+    simulation = OwnSimulation(parse_spec("hold"), harbour)
+    assert simulation.model is simulation.model
+    again = pickle.loads(pickle.dumps(simulation))
+    np.testing.assert_array_equal(again.alone(harbour).errors, simulation.alone(harbour).errors)
