@@ -198,9 +198,9 @@ def calibration_words(d: Diagnosis) -> str:
     where = "held-out runs" if c.held_out else "the runs that were fitted"
     model = f"your simulation {d.simulation}" if d.simulation else "the ship file's model"
     return (
-        f"In open-loop rollouts of at most {c.seconds:.0f} s on {where}, {model} is {figure(c.before)} m off on average. "
-        f"With the ship's own coefficients {'corrected' if d.simulation else 'calibrated'} it is {figure(c.after)} m off "
-        f"(95 %: {figure(c.ci95[0], 2)} to {figure(c.ci95[1], 2)} m)."
+        f"In open-loop rollouts of at most {c.seconds:.0f} s on {where}, {model} is {figure(c.before)} m off on average"
+        f". With the ship's own coefficients {'corrected' if d.simulation else 'calibrated'} it is {figure(c.after)} m"
+        f" off (95 %: {figure(c.ci95[0], 2)} to {figure(c.ci95[1], 2)} m)."
         + (_with_causes(d) if d.simulation else "")
         + (f" {floor_words(c.noise_floor)}" if c.noise_floor is not None else "")
         + "".join(
