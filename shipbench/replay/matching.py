@@ -7,6 +7,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import timedelta
+from functools import cached_property
 
 import numpy as np
 
@@ -117,9 +118,22 @@ class _Nearest:
 
     def __init__(self, data: Dataset) -> None:
         self.data = data
-        self.at = [(run, k) for run in data.runs for k in range(len(run))]
-        self.states = np.concatenate([run.states for run in data.runs])
-        self.accelerations = np.concatenate([_steps(np.hypot(run.states[:, U], run.states[:, V])) for run in data.runs])
+        self.first = np.cumsum([0, *(len(run) for run in data.runs)])
+
+    @cached_property
+    def states(self) -> np.ndarray:
+        """States of all runs, one below the other (samples, 10)."""
+        return np.concatenate([run.states for run in self.data.runs])
+
+    @cached_property
+    def accelerations(self) -> np.ndarray:
+        """Change of speed from each sample to the next (samples,) [m/s]."""
+        return np.concatenate([_steps(np.hypot(run.states[:, U], run.states[:, V])) for run in self.data.runs])
+
+    def at(self, place: int) -> tuple[Run, int]:
+        """Run and sample of a row of `states`."""
+        run = int(np.searchsorted(self.first, place, side="right")) - 1
+        return self.data.runs[run], place - int(self.first[run])
 
     def match(self, track: Track) -> tuple[Match | None, str]:
         """Match, or None and the reason."""
@@ -138,12 +152,12 @@ class _Nearest:
         )
         apart = np.max([distance / limits[0], turned / limits[1], faster / limits[2]], axis=0)
         best = int(np.argmin(apart))
-        run, k = self.at[best]
+        run, k = self.at(best)
         told = f"{distance[best]:.3g} m, {math.degrees(turned[best]):.3g} deg off"
         if apart[best] > 1.0:
             return None, f"the nearest measured state, {run.id} at t = {run.t[k]:g} s, is {told}"
         places = np.flatnonzero(apart <= 1.0)
-        runs = [self.at[i][0].id for i in places]
+        runs = [self.at(int(i))[0].id for i in places]
         near = THRESHOLDS.value("frame_time") * math.sqrt(L / 130.0)
         if len(set(runs)) > 1 or np.abs(places - best).max() * dt > near:
             return None, f"its start fits several places: {_listed(list(dict.fromkeys(runs)))}"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -141,6 +143,29 @@ def test_skill_is_one_less_the_ratio_of_the_means():
     assert found.skill("b", "a")[0] == pytest.approx(-1.0)
     assert np.isnan(matched([[1.0, 0.0], [2.0, 0.0]]).skill("a", "b")).all()  # nothing to be better than
     assert np.isnan(matched([[1.0, 4.0], [np.nan, 4.0]]).skill("a", "b")).all()
+
+
+def test_a_window_that_a_model_is_not_asked_for_is_left_out_of_its_comparisons():
+    rng = np.random.default_rng(3)
+    errors = rng.lognormal(size=(12, 3)) + np.array([0.0, 5.0, 9.0])
+    errors[8:, 1] = np.nan
+    asked = np.isfinite(errors)
+    found = replace(matched(errors, "abc"), asked=asked)
+    first = matched(errors[:8], "abc")
+    assert (found.complete, found.comparable) == (["a", "c"], ["a", "b", "c"])
+    pairs = {(p.first, p.second): p for p in found.pairs("abc")}
+    alone = {(p.first, p.second): p for p in first.pairs("abc")}
+    assert {pair: p.windows for pair, p in pairs.items()} == {("a", "b"): 8, ("a", "c"): 12, ("b", "c"): 8}
+    assert pairs["a", "b"].difference == pytest.approx(alone["a", "b"].difference)
+    assert pairs["a", "b"].p == pytest.approx(alone["a", "b"].p)
+    assert found.skill("b", "c")[0] == pytest.approx(first.skill("b", "c")[0])
+    assert np.isnan(found.wins("b", ["a", "c"])[8:]).all()
+    assert found.win_rate("b", ["a", "c"])[0] == pytest.approx(first.win_rate("b", ["a", "c"])[0])
+    assert np.array_equal(found.wins("c", ["a", "b"])[8:], found.wins("c", ["a"])[8:])
+    nothing = replace(found, asked=asked & [True, False, True])
+    assert nothing.comparable == ["a", "c"]
+    assert np.isnan(nothing.win_rate("b", ["a", "c"])).all()
+    assert nothing.common("a", "b") is None
 
 
 def test_draws_are_the_same_every_time():
