@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..predictors.predictions import ReplayReport
+from ..predictors.predictions import ReplayReport, size_text
 
 
 def replay_notes(summaries: Iterable[Mapping[str, Any]]) -> dict[tuple[str, str], list[str]]:
@@ -46,12 +46,7 @@ def _starts(reports: Iterable[ReplayReport]) -> str:
 
 
 def _size(values: np.ndarray, unit: str) -> str:
-    return f"median {_text(np.median(values))} {unit}, maximum {_text(np.max(values))} {unit}"
-
-
-def _text(value: float) -> str:
-    """Number with two digits; below a thousandth it is rounding of a file."""
-    return f"{value:.2g}" if value >= 1e-3 else "0"
+    return f"median {size_text(np.median(values), unit)}, maximum {size_text(np.max(values), unit)}"
 
 
 def _report(summary: Mapping[str, Any]) -> ReplayReport | None:

@@ -206,14 +206,14 @@ class Matched:
     def common(self, first: str, second: str) -> Matched | None:
         """Errors on the windows that both models are asked for, or None where there is none."""
         both = self._asks(first) & self._asks(second)
-        if both.all():
-            return self
+        if both.all() or not both.any():
+            return self if both.any() else None
         key = both.tobytes()
         if key not in self._parts:
             names, codes = np.unique(self.codes[both], return_inverse=True)
             boot = Bootstrap([self.boot.names[i] for i in names], len(self.boot.counts))
             self._parts[key] = Matched(self.models, self.errors[both], self.weights[both], codes, boot)
-        return self._parts[key] if both.any() else None
+        return self._parts[key]
 
     @cached_property
     def _parts(self) -> dict[bytes, Matched]:

@@ -23,6 +23,11 @@ NOT_COVERED = "no predicted trajectory covers it"
 """Reason in the rows of a window without a prediction."""
 
 
+def size_text(value: float, unit: str) -> str:
+    """Size with its unit; below a thousandth it is the rounding of a file."""
+    return f"{value if value >= 1e-3 else 0.0:.3g} {unit}"
+
+
 @dataclass(frozen=True, eq=False)
 class Trajectory:
     """Predicted trajectory of a run on the time grid of the data set.

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..effects.unit_or_sign_error import FACTORS
-from ..predictors.predictions import Trajectory
+from ..predictors.predictions import Trajectory, size_text
 from ..records import Run
 from ..ship import Ship
 from ..signals import PSI, STATES, R, U, V, wrap_angle
@@ -78,8 +78,8 @@ def frame_notes(pairs: Sequence[Pair], ship: Ship, dt: float) -> list[str]:
             else "No usual frame explains it; check psi, x and y: rad clockwise from north, m north, m east."
         )
         notes.append(
-            f"headings at the start differ by {math.degrees(float(np.median(turned))):.3g} deg (median over "
-            f"{len(seen)} trajectories), positions by {float(np.median(place)):.4g} m. {cause}"
+            f"headings at the start differ by {size_text(math.degrees(float(np.median(turned))), 'deg')} (median over "
+            f"{len(seen)} trajectories), positions by {size_text(float(np.median(place)), 'm')}. {cause}"
         )
     elif np.median(place) > far:
         notes.append(_origin_note(seen, place, ship))

@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from ..errors import InputError
-from ..predictors.predictions import Trajectory
+from ..predictors.predictions import Trajectory, size_text
 from ..records import Dataset, Run
 from ..render.escaping import csv_text
 from ..signals import PSI, R, U, V, X, Y, wrap_angle
@@ -153,7 +153,7 @@ class _Nearest:
         apart = np.max([distance / limits[0], turned / limits[1], faster / limits[2]], axis=0)
         best = int(np.argmin(apart))
         run, k = self.at(best)
-        told = f"{distance[best]:.3g} m, {math.degrees(turned[best]):.3g} deg off"
+        told = f"{size_text(distance[best], 'm')}, {size_text(math.degrees(turned[best]), 'deg')} off"
         if apart[best] > 1.0:
             return None, f"the nearest measured state, {run.id} at t = {run.t[k]:g} s, is {told}"
         places = np.flatnonzero(apart <= 1.0)
