@@ -40,7 +40,7 @@ HOUSE: dict[float, dict[str, str]] = {
     2.7: {"effects": "one cause a file, with the traits by which it is judged"},
     3: {"simulate": "the MMG simulator and ships of the literature"},
     3.2: {"estimation": "the ship's coefficients with priors: forward model, linearisation, evidence, calibration"},
-    3.5: {"predictors": "one model a file; `physics_model/` and `networks/` hold what they share"},
+    3.5: {"predictors": "one model a file; `physics_model/`, `networks/` and `fmu_model/` hold what they share"},
     3.7: {"exporting": "fitted physics for other programs, one format a file"},
     4: {"data": "data sets, files, corrections"},
     4.3: {"importing": "logs into data sets"},

@@ -30,7 +30,7 @@ from .fmu_model.calibration import Calibrated, Rollouts, calibrate
 from .fmu_model.crew import Crew
 from .fmu_model.description import read_description
 from .fmu_model.mapping import draft_command, mapping_of, open_parameters
-from .fmu_model.preparing import Prepared, kind_of, plan_of, prepare
+from .fmu_model.preparing import Prepared, check_platform, kind_of, plan_of, prepare
 from .fmu_model.signals_of import input_values, start_values, states_of
 
 _log = logging.getLogger(__name__)
@@ -80,6 +80,7 @@ class Fmu(PredictorBase):
         self.values = np.array([value for _, value, _, _ in self._open])
         self.result: Calibrated | None = None
         self.kind = kind_of(self._description, self.kind)
+        check_platform(self._description, self.kind)
         self.dt = float("nan")
         self._crew: Crew | None = None
         self._prepared: Prepared | None = None

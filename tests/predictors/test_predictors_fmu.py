@@ -138,7 +138,8 @@ def test_a_run_that_fails_is_a_row_and_the_others_are_predicted(ship_fmu, trial,
 
 def test_data_without_an_input_of_the_fmu_are_skipped(tmp_path, trial):
     extra = '<ScalarVariable name="wind_speed" valueReference="9" causality="input"><Real start="0"/></ScalarVariable>'
-    path = write_archive(tmp_path / "ship.fmu", {"modelDescription.xml": description(2, extra=extra)})
+    files = {"modelDescription.xml": description(2, extra=extra), "sources/ship.c": "not needed here"}
+    path = write_archive(tmp_path / "ship.fmu", files)
     model = make_predictor(str(path))
     assert model.skip(trial) == (
         "the FMU needs the input wind_speed, which the data have not. Give it a value in [constants] of its mapping"
@@ -219,6 +220,12 @@ def test_a_name_without_a_file_and_a_missing_package_are_one_message(ship_fmu, m
     monkeypatch.setitem(sys.modules, "fmpy", None)
     with pytest.raises(InputError, match=r"needs fmpy, which is not installed.*pip install 'shipbench\[fmu\]'"):
         make_predictor(str(ship_fmu()))
+
+
+def test_an_fmu_for_another_platform_is_refused_when_it_is_made(tmp_path):
+    files = {"modelDescription.xml": description(), "binaries/win64/ship.dll": "MZ"}
+    with pytest.raises(InputError, match=r"has libraries for win64 and no source; needed: \w+ \(ship\.\w+\)"):
+        make_predictor(str(write_archive(tmp_path / "ship.fmu", files)))
 
 
 @pytest.mark.long

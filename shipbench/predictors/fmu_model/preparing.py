@@ -46,6 +46,21 @@ def kind_of(description: Description, wanted: str) -> str:
     return wanted or (CO_SIMULATION if CO_SIMULATION in offered else MODEL_EXCHANGE)
 
 
+def check_platform(description: Description, kind: str) -> None:
+    """Refuse an FMU that has neither a library for this platform nor source.
+
+    Raises:
+        InputError: it has none.
+    """
+    names, suffix = archive.here()
+    if not description.sources and not set(names) & set(description.platforms):
+        raise InputError(
+            f"{description.path} has libraries for {', '.join(description.platforms) or 'no platform'} and no source; "
+            f"needed: {names[description.version - 2]} ({description.identifiers[kind]}{suffix}). Export it for this "
+            "platform, or with its source."
+        )
+
+
 def prepare(description: Description, kind: str) -> Prepared:
     """Extract an FMU, and compile it where it has no library for this platform.
 
@@ -58,16 +73,12 @@ def prepare(description: Description, kind: str) -> Prepared:
     identifier = description.identifiers[kind]
     places = [prepared.folder / "binaries" / name / f"{identifier}{suffix}" for name in names]
     if not any(place.is_file() for place in places):
-        if not description.sources:
-            raise InputError(
-                f"{description.path} has libraries for {', '.join(description.platforms) or 'no platform'} and no "
-                f"source; needed: {names[description.version - 2]} ({identifier}{suffix}). Export it for this "
-                "platform, or with its source."
-            )
-        _compile(description, prepared.folder)
+        check_platform(description, kind)
+        if description.sources:
+            _compile(description, prepared.folder)
     found = next((place for place in places if place.is_file()), None)
     if found is None:
-        raise InputError(f"{description.path}: compiling its source gave no {identifier}{suffix}. Export it again.")
+        raise InputError(f"{description.path} has no library {identifier}{suffix} for this platform. Export it again.")
     wanted = places[description.version - 2]  # FMPy looks for it under the name of the FMI version
     if not wanted.is_file():
         wanted.parent.mkdir(parents=True, exist_ok=True)
