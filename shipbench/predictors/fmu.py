@@ -64,8 +64,6 @@ class Fmu(PredictorBase):
     workers: int = 0
 
     def __post_init__(self) -> None:
-        if not self.path:
-            raise InputError("'fmu' is the model of a file; accepted: its path, such as --model ship.fmu.")
         self.free = [str(n) for n in ([self.free] if isinstance(self.free, str) else self.free)]
         for key in ("step", "limit", "workers"):
             value = getattr(self, key)
@@ -146,6 +144,7 @@ class Fmu(PredictorBase):
             self._close()
         self.dt, self.inputs = train.dt, train.inputs
         if self._open:
+            self._running().start(len(train))
             _, start, low, high = (np.array(column) for column in zip(*self._open, strict=True))
             self.result = calibrate(self._simulated, _rollouts(train), start.astype(float), low, high)
             self.values = self.result.values

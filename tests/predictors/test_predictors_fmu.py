@@ -213,7 +213,7 @@ def test_a_step_that_does_not_divide_the_sample_time_is_refused(ship_fmu, trial)
 
 
 def test_a_name_without_a_file_and_a_missing_package_are_one_message(ship_fmu, monkeypatch):
-    with pytest.raises(InputError, match="'fmu' is the model of a file; accepted: its path"):
+    with pytest.raises(InputError, match=r"'fmu' is made of a file\. Accepted: .*path\.fmu"):
         make_predictor("fmu")
     with pytest.raises(InputError, match=r"cannot read .*none\.fmu"):
         make_predictor("none.fmu")

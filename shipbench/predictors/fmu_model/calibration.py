@@ -22,7 +22,7 @@ _LEAST_SAMPLES = 10
 _LOST = 10.0
 """Residual of a run that failed, in typical sizes of the motion."""
 _TOLERANCE = 1e-7
-_ROUGH = 1e-2
+_ROUGH = 5e-2
 """Tolerance on short windows, which only give a start."""
 _MOST_EVALUATIONS = 40
 

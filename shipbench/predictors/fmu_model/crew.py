@@ -92,6 +92,12 @@ class Crew:
         """End the processes."""
         _end_all(self._workers)
 
+    def start(self, jobs: int) -> None:
+        """Start the processes that so many jobs need; they load the FMU while the caller goes on."""
+        while len(self._workers) < min(self.most, jobs):
+            self._workers.append(_Worker(self.plan))
+            self._workers[-1].connection.send(("data", self._inputs))
+
     def load(self, inputs: Sequence[np.ndarray]) -> None:
         """Hold the inputs (K, inputs) of each run, in the FMU's units, for the calls of `run`."""
         self._inputs = list(inputs)
@@ -111,9 +117,7 @@ class Crew:
             raise
 
     def _run(self, jobs: Sequence[tuple[int, np.ndarray]]) -> list[Answer]:
-        while len(self._workers) < min(self.most, len(jobs)):
-            self._workers.append(_Worker(self.plan))
-            self._workers[-1].connection.send(("data", self._inputs))
+        self.start(len(jobs))
         size = max(1, -(-len(jobs) // (_SHARES * len(self._workers))))
         numbered = [(place, run, values) for place, (run, values) in enumerate(jobs)]
         parts = deque(numbered[i : i + size] for i in range(0, len(numbered), size))
@@ -125,12 +129,13 @@ class Crew:
             busy = [one for one in self._workers if left[one]]
             for one in self._ready(busy):
                 got = self._received(one)
-                if not isinstance(got, Answer):
+                if isinstance(got, str):
                     if got:
                         raise WorkError(f"{self.name}: {got}")
                     continue
-                answers[got.place] = got
-                left[one] -= 1
+                for answer in got:
+                    answers[answer.place] = answer
+                left[one] -= len(got)
                 if not left[one]:
                     self._give(one, parts, left)
         return [answer for answer in answers if answer is not None]

@@ -8,11 +8,14 @@ from __future__ import annotations
 
 import os
 import threading
+import time
 from multiprocessing.connection import Connection
 from typing import Any
 
 PROGRESS_BYTES = 8
 """Bytes of the shared memory: the simulated time [s]."""
+_SEND_EVERY = 0.05
+"""Longest time [s] that answers are kept back, so that short runs are sent together."""
 
 
 def main(connection: int, alive: int, progress: int) -> None:
@@ -62,10 +65,15 @@ def _answer(connection: Connection, at: Any) -> None:
         if kind == "data":
             inputs = content
             continue
+        answers, sent, left = list[Answer](), time.monotonic(), len(content)
         for place, run, values in content:
             found, reason = instance.run(values, inputs[run])
             if not checked and not reason:
                 checked = True
                 again, _ = instance.run(values, inputs[run])
                 instance.remake = not (again == found).all()
-            connection.send(Answer(place, found, reason))
+            answers.append(Answer(place, found, reason))
+            if len(answers) == left or time.monotonic() - sent > _SEND_EVERY:
+                connection.send(answers)
+                left -= len(answers)
+                answers, sent = [], time.monotonic()
