@@ -202,7 +202,7 @@ def diagnose(
     Args:
         data: a data set, its registered name or its folder.
         model: your own simulation, judged in place of the ship file's physics: a spec such as "sim.py:simulate", a
-            folder of a saved model, a class, or a function simulate(s0, U, dt).
+            folder of a saved model, predictions:FOLDER, a class, or a function simulate(s0, U, dt).
         gain: measure the gain of the causes on held-out runs, which takes most of the time.
         seed: of folds and bootstrap.
         workers: number of processes; 1: everything runs in this one.
@@ -214,10 +214,16 @@ def diagnose(
     """
     from .bench.progress import steps_shown
     from .diagnosis.diagnose import diagnose as run
+    from .replay.stand_in import stand_in
 
     with steps_shown(quiet):
-        simulation = None if model is None else spec_of(model)
-        found = run(_loaded(data), gain=gain, seed=seed, workers=workers, thorough=thorough, simulation=simulation)
+        dataset = _loaded(data)
+        judged = None if model is None else stand_in(spec_of(model), dataset)
+        found = run(
+            dataset, gain=gain, seed=seed, workers=workers, thorough=thorough,
+            simulation=None if judged is None else judged.spec,
+        )  # fmt: skip
+    found = replace(found, stand_in="" if judged is None else judged.note)
     spec = "" if isinstance(data, Dataset) else os.fspath(data)
     return Verdict(**{f.name: getattr(found, f.name) for f in fields(found)} | {"spec": spec})
 

@@ -8,9 +8,21 @@ from typing import Annotated
 
 import typer
 
+from ..errors import InputError
 from ..names import file_name
 from ..regular_files import make_folder
-from .common import Commands, DatasetArgument, Full, Json, Quiet, print_json, say, screen_width
+from .common import (
+    Commands,
+    DatasetArgument,
+    Full,
+    Json,
+    PredictionsMapping,
+    Quiet,
+    predicted_models,
+    print_json,
+    say,
+    screen_width,
+)
 
 
 def diagnose(
@@ -21,6 +33,11 @@ def diagnose(
             "-m", "--model", help="Your own simulation to judge, such as sim.py:simulate (default: the ship file's)."
         ),
     ] = None,
+    predictions: Annotated[
+        str | None,
+        typer.Option(help="Trajectories that your simulation predicted, where the simulator itself is not at hand."),
+    ] = None,
+    mapping: PredictionsMapping = None,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -48,6 +65,7 @@ def diagnose(
     from ..data.base import load_dataset
     from ..diagnosis.diagnose import diagnose as run
     from ..estimation.budget import Budget
+    from ..replay.stand_in import stand_in
     from ..reports.diagnosis.files import document, with_correction, write_diagnosis
     from ..reports.diagnosis.summary import summary_lines
     from ..specs import parse_spec
@@ -55,12 +73,17 @@ def diagnose(
     data = load_dataset(dataset)
     folder = out or Path("diagnoses") / file_name(Path(data.name).name)
     make_folder(folder)
+    if model is not None and predictions is not None:
+        raise InputError("--model and --predictions are both given; accepted: one of them, the simulation to judge.")
+    asked = [*([model] if model else []), *predicted_models([predictions] if predictions else None, mapping)]
+    judged = stand_in(parse_spec(asked[0]), data) if asked else None
     with steps_shown(quiet or as_json):
         found = run(
             data, gain=gain, seed=seed, workers=workers, thorough=thorough, budget=Budget(seconds=cpu_limit),
-            simulation=None if model is None else parse_spec(model),
+            simulation=None if judged is None else judged.spec,
         )  # fmt: skip
-    found = with_correction(replace(found, spec=dataset), folder)
+    found = replace(found, spec=dataset, stand_in="" if judged is None else judged.note)
+    found = with_correction(found, folder)
     written = write_diagnosis(found, folder)
     if as_json:
         print_json(document(found))

@@ -184,7 +184,7 @@ class Diagnosis:
 
     spec: name of the data set in commands, a folder or name[key=value]; "" where that is its own name.
     simulation: spec of the simulation that was judged in place of the ship file's physics, or "". correction: what
-    corrects it.
+    corrects it. stand_in: what a reader must know where another model stands in for the simulation, or "".
     """
 
     dataset: str
@@ -204,6 +204,7 @@ class Diagnosis:
     spec: str = ""
     calibration: Calibrated | None = None
     simulation: str = ""
+    stand_in: str = ""
     correction: Correction | None = None
 
     def __repr__(self) -> str:
@@ -224,6 +225,7 @@ class Diagnosis:
             "extended_model": self.extended_model, "fingerprint": self.fingerprint, "seconds": round(self.seconds, 2),
             "gain": None if self.gain is None else _plain(asdict(self.gain)), "unknown": _plain(self.unknown),
             "warnings": list(self.warnings),
+            **({"stand_in": self.stand_in} if self.stand_in else {}),
         }  # fmt: skip
 
     def _calibration(self, found: Calibrated) -> dict[str, Any]:

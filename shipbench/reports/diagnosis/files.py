@@ -24,7 +24,7 @@ def write_diagnosis(d: Diagnosis, folder: Path) -> list[Path]:
         write_text(folder / "diagnosis.json", content + "\n"),
         write_text(folder / "summary.txt", "\n".join(summary_lines(d)) + "\n"),
         write_report(d, folder / "report.html"),
-        *(write_correction(d, folder) if corrects(d) else []),
+        *(write_correction(d, folder) if corrects(d) else [_write_law(d, folder)] if d.correction is not None else []),
     ]
 
 
@@ -35,7 +35,7 @@ def with_correction(d: Diagnosis, folder: Path) -> Diagnosis:
 
 def corrects(d: Diagnosis) -> bool:
     """Whether a correction of the simulation can be written: it has a file, and the correction reduces its error."""
-    if d.correction is None or d.calibration is None or parse_spec(d.simulation).path is None:
+    if d.correction is None or d.calibration is None or d.stand_in or parse_spec(d.simulation).path is None:
         return False
     after = d.calibration.after if d.gain is None else min(d.calibration.after, d.gain.after)
     return after < d.calibration.before or bool(d.causes)
@@ -53,8 +53,14 @@ def write_correction(d: Diagnosis, folder: Path) -> list[Path]:
     found = "; ".join(in_words(c) for c in d.causes) or "nothing beyond the ship's own coefficients"
     return [
         write_text(folder / _CORRECTED, _MODULE.format(found=repr(found), spec=repr(text))),
-        write_text(folder / "force_law.txt", str(d.correction.physics.describe()).rstrip() + "\n"),
+        _write_law(d, folder),
     ]
+
+
+def _write_law(d: Diagnosis, folder: Path) -> Path:
+    """Write force_law.txt: coefficients of the physics whose difference to the ship file's corrects the simulation."""
+    law = "" if d.correction is None else str(d.correction.physics.describe()).rstrip()
+    return write_text(folder / "force_law.txt", law + "\n")
 
 
 _CORRECTED = "corrected.py"

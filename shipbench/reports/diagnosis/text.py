@@ -202,6 +202,7 @@ def calibration_words(d: Diagnosis) -> str:
         f". With the ship's own coefficients {'corrected' if d.simulation else 'calibrated'} it is {figure(c.after)} m"
         f" off (95 %: {figure(c.ci95[0], 2)} to {figure(c.ci95[1], 2)} m)."
         + (_with_causes(d) if d.simulation else "")
+        + (f" {d.stand_in}" if d.stand_in else "")
         + (f" {floor_words(c.noise_floor)}" if c.noise_floor is not None else "")
         + "".join(
             f" The calibrated ship's {m.coefficient} is {_changed(m.change)} than the ship file's "

@@ -145,3 +145,29 @@ def test_where_only_the_hull_is_a_cause_the_verdict_is_the_ships_own_coefficient
     beside = replace(make_diagnosis(), causes=(CAUSE, hull))
     assert "and the ship's own coefficients (hull_derivatives). With it, the position error of" in headline(beside)
     assert "With them, the position error on held-out runs falls from 15.7 m to 0.467 m" in gain_words(own, hull)
+
+
+def judged(**changes):
+    """Diagnosis of a simulation of the user's own, with a cause and its gain on held-out runs."""
+    own = Calibrated(21.6, 14.2, (11.0, 17.0), 120.0, True)
+    gain = replace(GAIN, before=14.2, after=6.3, after_ci95=(5.1, 7.9))
+    d = replace(make_diagnosis(), simulation="sim.py:simulate", calibration=own, gain=gain)
+    return replace(d, extended_model="out/corrected.py:corrected", **changes)
+
+
+def test_a_simulation_is_told_alone_with_coefficients_and_with_the_cause():
+    text = calibration_words(judged())
+    assert "your simulation sim.py:simulate is 21.6 m off on average" in text
+    assert "With the ship's own coefficients corrected it is 14.2 m off (95 %: 11 to 17 m)." in text
+    assert "With a current of 0.31 m/s towards 143° as well it is 6.30 m off (95 %: 5.1 to 7.9 m)." in text
+    assert "ship file" not in text
+
+
+def test_the_next_command_runs_the_simulation_beside_its_correction():
+    command = next_command(judged())
+    assert command == "shipbench run --model sim.py:simulate --model out/corrected.py:corrected --dataset trial"
+    assert next_command(replace(judged(), extended_model="sim.py:simulate")) == ""
+
+
+def test_a_stand_in_is_said():
+    assert calibration_words(judged(stand_in="Only trajectories are known.")).endswith("Only trajectories are known.")
