@@ -36,12 +36,17 @@ class HasShipScales(Protocol):
     @property
     def structure(self) -> np.ndarray: ...
 
+    @property
+    def centre(self) -> np.ndarray | None: ...
+
 
 class ShipScales(NamedTuple):
-    """Units of the coefficients of one ship: `p` of p0..p10, `structure` of the structure's values."""
+    """Units of the coefficients of one ship: `p` of p0..p10, `structure` of the structure's values. `centre`: what is
+    added to `base`, None for nothing."""
 
     p: np.ndarray
     structure: np.ndarray
+    centre: np.ndarray | None = None
 
     @classmethod
     def of(cls, ship: Particulars, c: eq2.Coefficients, measured_wind: bool) -> ShipScales:
@@ -62,6 +67,7 @@ def parameters(scales: HasShipScales, base: np.ndarray) -> tuple[list[np.ndarray
 
     Leading axes are kept, so that (D, 1) spreads over segments.
     """
+    base = base if scales.centre is None else base + scales.centre
     p: list[np.ndarray | float] = [0.0] * 11
     for i, index in enumerate(FREE):
         p[index] = (CENTRE[i] + SPREAD[i] * base[..., i]) * scales.p[index]

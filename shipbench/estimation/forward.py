@@ -18,12 +18,11 @@ from ..records import Dataset
 from ..ship import Particulars, complete
 from ..signals import ACTUATORS, MOTION, STATES
 from .actuator_fit import DEFAULT_ACTUATORS
+from .beside import PUSHES, centre_of
 from .resampling import averaged
 from .rollout import Active, Course, Vessel
 from .thresholds import THRESHOLDS
 
-PUSHES = ("push_u", "push_v", "push_r")
-"""Channels of a known acceleration [m/s^2, m/s^2, rad/s^2] that acts beside the model, held over a sample."""
 NO_GEAR = Gear(1e-3, 1e12)
 SEGMENT = THRESHOLDS.value("segment_length")
 MOST_STEPS = THRESHOLDS.count("most_steps")
@@ -59,7 +58,7 @@ class Segments:
     earlier (B, P, 4): commands before the segment (the first one, before the run); empty where actuators are recorded.
     kinds: manoeuvre by run, "" where not given. seen (6,): which motion channels were measured. depth (B,): mean
     recorded depth [m]; None where none is recorded, in deep water, or where it is less than the draught. working: names
-    of the actuators that work in any run. known (B, K + 1, 3): acceleration of the channels `PUSHES`, or None.
+    of the actuators that work in any run. known (B, K + 1, 3), centre: of `BesideSimulation`.
     """
 
     dt: float
@@ -77,6 +76,7 @@ class Segments:
     depth: np.ndarray | None = None
     working: frozenset[str] = frozenset(STATES[ACTUATORS])
     known: np.ndarray | None = None
+    centre: np.ndarray | None = None
 
     def thinned(self, most: int) -> Segments:
         """Segments evenly spread, at most `most`; every run keeps at least one."""
@@ -144,7 +144,7 @@ def cut(dataset: Dataset, steps: int, still: Collection[str] = ()) -> Segments:
         run=np.array([p[0] for p in pieces]), start=np.array([p[2] * dataset.dt for p in pieces]), runs=len(dataset),
         kinds=tuple(run.kind for run in dataset.runs),
         seen=~np.isin(STATES[MOTION], dataset.derived), depth=depth, working=working(dataset) - set(still),
-        known=None if pushed is None else inputs[..., pushed],
+        known=None if pushed is None else inputs[..., pushed], centre=centre_of(dataset),
     )  # fmt: skip
 
 

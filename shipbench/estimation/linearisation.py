@@ -55,6 +55,7 @@ class Scales:
         self.structure = STRUCTURE.spreads(plant.ship, measured_wind=plant.seg.wind is not None)
         self.noise = np.array([0.3 * froude**2, 0.3 * froude**2, 4e-3, 0.04 * froude, 0.04 * froude, 7e-4 / froude])
         self.colour = Colour.white(plant.steps + 1)
+        self.centre = plant.seg.centre
 
     def coloured(self, colour: Colour) -> Scales:
         """Return them with another noise model."""

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from ...estimation.forward import PUSHES, Segments, cut
+from ...estimation.beside import PUSHES, BesideSimulation
+from ...estimation.forward import Segments, cut
 from ...estimation.resampling import averaged
 from ...predictors.base import make_predictor
 from ...predictors.context import Context, predicted
@@ -44,7 +45,7 @@ class OwnSimulation:
         """State without the model, whose code another process loads anew."""
         return {"spec": self.spec, "known": self.known}
 
-    def beside(self, dataset: Dataset) -> Dataset:
+    def beside(self, dataset: Dataset) -> BesideSimulation:
         """Runs with what the simulation adds to the ship file's physics (`beside_simulation`)."""
         return beside_simulation(without_pushes(dataset), self.model)
 
@@ -70,7 +71,9 @@ def without_pushes(dataset: Dataset) -> Dataset:
         return dataset
     keep = [i for i, name in enumerate(dataset.inputs) if name not in PUSHES]
     names = tuple(dataset.inputs[i] for i in keep)
-    return dataset.with_runs(replace(r, inputs=r.inputs[:, keep], inputs_names=names) for r in dataset.runs)
+    runs = tuple(replace(r, inputs=r.inputs[:, keep], inputs_names=names) for r in dataset.runs)
+    whole = {f.name: getattr(dataset, f.name) for f in fields(Dataset)}
+    return Dataset(**whole | {"runs": runs})
 
 
 @dataclass(frozen=True, eq=False)

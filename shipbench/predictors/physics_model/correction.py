@@ -1,44 +1,56 @@
 """Correction of a simulation by fitted physics: what the ship's own coefficients and further causes add to it.
 
-The accelerations of a simulation are those of the ship file's physics and a rest, which one-step predictions from
-measured states show. Beside that rest the physics is calibrated anew: its coefficients and causes are then those that
-the simulation lacks. The correction is the difference of the calibrated physics to the ship file's.
+The accelerations of a simulation are those of the physics nearest to it and a rest, which one-step predictions from
+measured states show. Beside that rest the physics is calibrated anew, with the prior between ships about the nearest
+physics: its changes and causes are then those that the simulation lacks. The correction is that difference.
 
 Source: docs/theory.md#a-simulation-of-your-own.
 """
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
 
 from ...errors import InputError
+from ...estimation.beside import PUSHES, BesideSimulation, centre_of
 from ...estimation.coefficients import NUM_BASE, parameters
 from ...estimation.extension import extension_of, measured, true_start
-from ...estimation.forward import PUSHES, Plant, cut
+from ...estimation.forward import Plant, cut
 from ...estimation.linearisation import Scales
 from ...estimation.rollout import Vessel, accelerations
 from ...records import Dataset, Run
+from ...regular_files import read_json
 from ...ship import complete
 from ...signals import MOTION, PSI, STATES, R, U, V, X, Y
 from ...specs import EffectSpec, parse_spec
+from ...storage import write_text
 from ..base import make_predictor
 from ..calibrated import Calibrated
 from ..context import Context, predicted
 
 _SPEEDS = [U, V, R]
+_REFERENCE, _MOST_JSON = "reference.json", 10_000
+"""File of the reference, and its most bytes."""
+_ITERATIONS, _STEP = 12, 1e-3
+"""Gauss-Newton steps of the physics nearest to a simulation, and the difference of a coefficient for its slope."""
+_LEAST_ERROR = np.array([1e-5, 1e-5, 1e-7])
+"""Accelerations [m/s^2, m/s^2, rad/s^2] below which the nearest physics is as good as equal."""
 _ROWS = 20_000
 """Most states from which a simulation steps in one call."""
 
 
-def beside_simulation(dataset: Dataset, model: Any) -> Dataset:
-    """Data set with the channels `PUSHES`: accelerations of a simulation beyond those of the ship file's physics.
+def beside_simulation(dataset: Dataset, model: Any) -> BesideSimulation:
+    """Data set with the coefficients of the physics nearest to a simulation, and what the simulation does beyond it.
 
-    Both step once from every measured state, with the inputs of that sample.
+    The simulation steps once from every measured state, with the inputs of that sample. The physics nearest to it is
+    the maximum of the posterior under the prior between ships, with the differences of the accelerations as errors.
+    What these coefficients do not explain becomes the channels `PUSHES`.
 
     Args:
         model: a fitted model with `predict`.
@@ -47,18 +59,43 @@ def beside_simulation(dataset: Dataset, model: Any) -> Dataset:
         InputError: the simulation returns no finite state from a measured one.
     """
     plant = Plant(complete(dataset.ship), cut(dataset, max(map(len, dataset.runs))))
-    p, ship = parameters(Scales(plant), np.zeros(NUM_BASE))
-    states = np.swapaxes(plant.seg.states[:, :-1, MOTION], 0, 1)[None]
-    calm = np.zeros((*plant.seg.mask.shape, 3))
-    ends = np.swapaxes(plant.steps_from(states, p, ship, plant.pushes(calm))[0], 0, 1)
+    goal = np.zeros((*plant.seg.mask[:, 1:].shape, 3))
+    for i, run in enumerate(dataset.runs):
+        goal[i, : len(run) - 1] = _one_step(dataset, run.id, model)[:, _SPEEDS]
+    base, rest = _nearest(plant, goal)
     runs = []
-    for run, step in zip(dataset.runs, ends, strict=True):
-        start = run.states[:-1]
-        own = (step[: len(start), 3:] - start[:, _SPEEDS]) / dataset.dt
-        push = (_one_step(dataset, run.id, model)[:, _SPEEDS] - start[:, _SPEEDS]) / dataset.dt - own
+    for run, push in zip(dataset.runs, rest, strict=True):
+        push = push[: len(run) - 1]
         inputs = np.column_stack([run.inputs, np.concatenate([push, push[-1:]])])
         runs.append(replace(run, inputs=inputs, inputs_names=(*run.inputs_names, *PUSHES)))
-    return dataset.with_runs(runs)
+    whole = {f.name: getattr(dataset, f.name) for f in fields(Dataset)} | {"runs": tuple(runs)}
+    return BesideSimulation(**whole, centre=base)
+
+
+def _nearest(plant: Plant, goal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Coefficients (NUM_BASE,) with which the physics steps nearest to the speeds `goal` (B, K, 3), and the
+    accelerations (B, K, 3) that remain; Gauss-Newton with the size of each axis's error found meanwhile.
+
+    Errors last as long as the latent force does between its knots, and count once in that time.
+    """
+    scales, seg = Scales(plant), plant.seg
+    states, calm = np.swapaxes(seg.states[:, :-1, MOTION], 0, 1)[None], np.zeros((*seg.mask.shape, 3))
+    push = plant.pushes(calm)
+
+    def rest(base: np.ndarray) -> np.ndarray:
+        """Remaining accelerations (D, B, K, 3) for coefficients (D, NUM_BASE)."""
+        p, ship = parameters(scales, base[:, None, None, :])
+        ends = np.swapaxes(plant.steps_from(states, p, ship, push), 1, 2)
+        return np.where(seg.mask[:, 1:, None], (goal - ends[..., 3:]) / seg.dt, 0.0)
+
+    base, samples = np.zeros(NUM_BASE), float(seg.mask[:, 1:].sum())
+    for _ in range(_ITERATIONS):
+        found = rest(np.concatenate([base[None], base + _STEP * np.eye(NUM_BASE)]))
+        e, J = found[0].reshape(-1, 3), np.moveaxis((found[0] - found[1:]) / _STEP, 0, -1).reshape(-1, 3, NUM_BASE)
+        weight = seg.dt / plant.knot_time * samples / np.maximum((e**2).sum(axis=0), samples * _LEAST_ERROR**2)
+        H = np.einsum("nai,naj,a->ij", J, J, weight) + np.eye(NUM_BASE)
+        base = base + np.linalg.solve(H, np.einsum("nai,na,a->i", J, e, weight) - base)
+    return base, rest(base[None])[0]
 
 
 def _one_step(dataset: Dataset, name: str, model: Any) -> np.ndarray:
@@ -102,9 +139,15 @@ def correctable(causes: Sequence[str]) -> tuple[str, ...]:
 
 @dataclass(frozen=True, eq=False)
 class Correction:
-    """Fitted physics whose difference to the ship file's corrects a simulation."""
+    """Fitted physics whose difference to that nearest to a simulation corrects the simulation.
+
+    Args:
+        physics: the model `calibrated`, with the causes.
+        reference: (NUM_BASE,) coefficients of the physics nearest to the simulation.
+    """
 
     physics: Calibrated
+    reference: np.ndarray
 
     @classmethod
     def fit(cls, train: Dataset, causes: Sequence[str] = ()) -> Self:
@@ -113,7 +156,10 @@ class Correction:
         physics = physics.extend([EffectSpec(name) for name in causes]) if causes else physics
         physics.fit(train)
         physics.inputs = tuple(name for name in train.inputs if name not in PUSHES)
-        return cls(physics)
+        centre = centre_of(train)
+        reference = np.zeros(NUM_BASE) if centre is None else centre
+        physics.calibration = replace(physics.calibration, base=physics.calibration.base + reference)
+        return cls(physics, reference)
 
     @classmethod
     def load(cls, folder: str | Path) -> Self:
@@ -122,11 +168,15 @@ class Correction:
         Raises:
             InputError: the folder holds none.
         """
-        return cls(Calibrated.load(folder))
+        reference = np.array(read_json(Path(folder) / _REFERENCE, most=_MOST_JSON), dtype=float)
+        if reference.shape != (NUM_BASE,) or not np.isfinite(reference).all():
+            raise InputError(f"{folder}/{_REFERENCE} does not hold {NUM_BASE} numbers; diagnose the simulation again.")
+        return cls(Calibrated.load(folder), reference)
 
     def save(self, folder: str | Path) -> None:
-        """Write it as the saved model `calibrated` of its physics."""
+        """Write it as the saved model `calibrated` of its physics, and the reference."""
         self.physics.save(folder)
+        write_text(Path(folder) / _REFERENCE, json.dumps(self.reference.tolist()) + "\n")
 
     def predict(
         self, model: Any, s0: np.ndarray, U: np.ndarray, dt: float, context: Context | None = None
@@ -154,7 +204,7 @@ class Correction:
         """Accelerations (batch, 3) that the simulation lacks in states s (batch, 10)."""
         x, y, psi, u, v, r, n, delta, F_b, F_s = s.T
         both = []
-        for base, forces in ((self.physics.calibration.base, self.physics._active("force")), (np.zeros(NUM_BASE), ())):
+        for base, forces in ((self.physics.calibration.base, self.physics._active("force")), (self.reference, ())):
             p, active = self.physics._formula(base, forces)
             vessel = Vessel(self.physics.particulars, self.physics.c)
             found = accelerations((x, y, psi, u, v, r), np.stack([n, delta, F_b, F_s]), t, wind, p, active, vessel)

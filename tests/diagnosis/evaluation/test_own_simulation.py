@@ -7,7 +7,7 @@ import pickle
 import numpy as np
 
 from shipbench.diagnosis.evaluation.own_simulation import OwnSimulation, Rollouts, without_pushes
-from shipbench.estimation.forward import PUSHES
+from shipbench.estimation.beside import PUSHES
 from shipbench.metrics.ed import ed
 from shipbench.specs import parse_spec, spec_of
 
