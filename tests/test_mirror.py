@@ -40,6 +40,7 @@ ELSEWHERE = {
     "diagnosis/preparation/time_offsets": "estimation/test_budget.py",
     "diagnosis/result": "diagnosis/test_candidates.py",
     "diagnosis/thresholds": "test_thresholds.py",
+    "estimation/beside": "predictors/physics_model/test_correction.py",
     "estimation/actuator_fit": "predictors/test_physics.py",
     "estimation/baseline": "estimation/test_gauss_newton.py",
     "estimation/coefficients": "estimation/test_robust_prior.py",
