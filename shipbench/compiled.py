@@ -58,19 +58,26 @@ static void fetch(v *to, const double *from, num size, num across, num along, nu
 }
 void lanes(const num *shape, num carried, const double *const *in, const num (*by)[5], double *out, const num *out_by) {
   static const num SIZES[] = {SIZES_IN};
-  for (num d = 0; d < shape[0]; d++) for (num b = 0; b < shape[2]; b += W) {
+  // d is inside, where results lie beside each other; outside where k is carried
+  const num outside = carried ? shape[0] : 1, inside = carried ? 1 : shape[0];
+  for (num o = 0; o < outside; o++) for (num b = 0; b < shape[2]; b += W) {
     const num n = shape[2] - b < W ? shape[2] - b : W;
-    v g[NG], y[NY];
-    for (num k = 0; k < shape[1]; k++) {
+    v g[NG], c[NC + 1], y[NY];
+    for (num k = 0; k < shape[1]; k++) for (num i = 0; i < inside; i++) {
+      const num d = o + i;
       for (num s = 0; s < shape[3]; s++) {
+        num fresh = 0;
         v *to = g;
-        for (num j = 0; j < NI; to += SIZES[j++]) {
-          const num other = (!k && !s) || by[j][3] || (!s && by[j][1]);  // what is the same as before is not read again
-          if (j ? other : !s && (!k || !carried))
+        for (num j = 0; j < NI; to += SIZES[j++]) {  // what is the same as before is not read again
+          const num first = !s && ((!k && !i) || (inside > 1 && by[j][0]) || (!i && by[j][1]));
+          if (j || NY != SIZES[0] ? first || by[j][3] : !s && (!k || !carried)) {
             fetch(to, in[j] + d * by[j][0] + k * by[j][1] + b * by[j][2] + s * by[j][3], SIZES[j], by[j][2], by[j][4],
                   n);
+            fresh |= j != ALONE;
+          }
         }
-        step(g, y);
+        if (fresh || NY == SIZES[0]) common(g, c);
+        step(g, c, y);
         if (NY == SIZES[0]) for (num i = 0; i < NY; i++) g[i] = y[i];
       }
       for (num l = 0; l < n; l++)
@@ -171,10 +178,11 @@ class Lanes:
         self.sizes, self.num, self._compiled = sizes, num, compiled
 
     @classmethod
-    def of(cls, function: casadi.Function) -> Lanes | None:
+    def of(cls, function: casadi.Function, alone: int | None = None) -> Lanes | None:
         """Lanes of a function in SX, one vector per bundle, to one vector. None where there is no compiler, or it holds
-        an operation that is not known: use the formula itself."""
-        compiled = machine_code(c_source(function), "lanes", _LANES_ARGUMENTS)
+        an operation that is not known: use the formula itself. alone: a bundle that often is the only one to change
+        along D; what does not depend on it is then computed once for all D."""
+        compiled = machine_code(c_source(function, alone), "lanes", _LANES_ARGUMENTS)
         return (
             None
             if compiled is None
@@ -203,17 +211,23 @@ class Lanes:
         )
 
 
-def c_source(function: casadi.Function) -> str | None:
+def c_source(function: casadi.Function, alone: int | None = None) -> str | None:
     """C code of `Lanes`; None where the function holds an operation that is not known here."""
     sizes = [function.numel_in(i) for i in range(function.n_in())]
-    body = _instructions(function, [f"g[{sum(sizes[:i])} + {{}}]" for i in range(len(sizes))])
-    if body is None:
+    found = _instructions(function, [f"g[{sum(sizes[:i])} + {{}}]" for i in range(len(sizes))], alone)
+    if found is None:
         return None
+    first, then, kept = ("\n".join(lines) for lines in found)
     head = (
         f"#define NI {len(sizes)}\n#define NG {sum(sizes)}\n#define NY {function.numel_out(0)}\n"
         f"#define SIZES_IN {', '.join(map(str, sizes))}\n"
+        f"#define NC {len(found[2])}\n#define ALONE {-1 if alone is None else alone}\n"
     )
-    return f"{_HEAD}{head}static void step(const v *g, v *y) {{\n{body}\n}}\n{_LANES}"
+    steps = (
+        f"static void common(const v *g, v *c) {{\n{first}\n{kept}\n}}\n"
+        f"static void step(const v *g, const v *c, v *y) {{\n{then}\n}}\n"
+    )
+    return f"{_HEAD}{head}{steps}{_LANES}"
 
 
 def operations(function: casadi.Function) -> Iterator[tuple[str, list[int], list[int], float]]:
@@ -229,21 +243,40 @@ def operations(function: casadi.Function) -> Iterator[tuple[str, list[int], list
         yield name, function.instruction_input(k), function.instruction_output(k), value
 
 
-def _instructions(function: casadi.Function, places: Sequence[str]) -> str | None:
-    """Instructions of the function in C, its inputs taken from `places`."""
-    lines = [f"v {', '.join(f'a{i}' for i in range(function.sz_w()))};"]
-    for name, given, out, value in operations(function):
+def _instructions(
+    function: casadi.Function, places: Sequence[str], alone: int | None
+) -> tuple[list[str], list[str], list[str]] | None:
+    """Instructions of the function in C, its inputs taken from `places`: those that do not depend on the input `alone`,
+    the others, and what the first keep for these."""
+    first, then, kept = list[str](), list[str](), list[str]()
+    now, changes, known = dict[int, str](), set[str](), dict[str, str]()  # `now`: what a place of CasADi's memory holds
+
+    def taken(place: int, late: bool) -> str:
+        value = now[place]
+        if not late or value in changes or not value.startswith("a"):
+            return value
+        if value not in known:
+            known[value] = f"c[{len(kept)}]"
+            kept.append(f"{known[value]} = {value};")
+        return known[value]
+
+    for k, (name, given, out, value) in enumerate(operations(function)):
         if name == "CONST" and math.isfinite(value):
-            lines.append(f"a{out[0]} = K({value!r});")
+            now[out[0]] = f"K({value!r})"
         elif name == "INPUT":
-            lines.append(f"a{out[0]} = {places[given[0]].format(given[1])};")
+            now[out[0]] = places[given[0]].format(given[1])
+            changes |= {now[out[0]]} if given[0] == alone else set()
         elif name == "OUTPUT":
-            lines.append(f"y[{out[1]}] = a{given[0]};")
+            then.append(f"y[{out[1]}] = {taken(given[0], late=True)};")
         elif name in _C:
-            lines.append(f"a{out[0]} = {_C[name].format(*(f'a{i}' for i in given))};")
+            late = alone is None or any(now[place] in changes for place in given)
+            line = f"const v a{k} = {_C[name].format(*(f'({taken(place, late)})' for place in given))};"
+            (then if late else first).append(line)
+            now[out[0]] = f"a{k}"
+            changes |= {f"a{k}"} if late else set()
         else:
             return None
-    return "\n".join(lines)
+    return first, then, kept
 
 
 def c_function(code: str, name: str, arguments: Sequence[Any]) -> Callable[..., Any] | None:

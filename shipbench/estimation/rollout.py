@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     from ..compiled import Lanes
 
 _built: dict[tuple[Any, ...], Lanes | None] = {}
+_VALUES = 1
+"""Bundle of the values of p and effects, of which sensitivities change one after the other."""
 
 
 @dataclass(frozen=True)
@@ -311,7 +313,7 @@ def _compiled(active: Sequence[Active], vessel: Vessel, wind: bool, steps: bool,
     from ..compiled import Lanes
 
     try:
-        return Lanes.of(_traced(active, vessel, wind, steps, any_ship))
+        return Lanes.of(_traced(active, vessel, wind, steps, any_ship), None if steps else _VALUES)
     except (RuntimeError, TypeError, ValueError):
         return None
 
