@@ -16,6 +16,7 @@ from shipbench.estimation.forward import Plant, Segments
 from shipbench.estimation.gram import Gram, Hyper, Products, Reduced, Solution, ornstein_uhlenbeck, solve
 from shipbench.estimation.laplace import Fit, Model
 from shipbench.estimation.linearisation import Point, Scales
+from shipbench.estimation.packed import length
 from shipbench.estimation.term import Term
 from shipbench.physics.mmg import load_mmg_ship
 from shipbench.ship import Particulars, complete
@@ -65,13 +66,14 @@ def _around(plant: Plant, terms: tuple[Term, ...], solution: Solution) -> Fit:
     """A fit with a solution, on data that say nothing."""
     seg, model, hyper = plant.seg, Model(terms), Hyper(np.zeros(3), np.zeros(6), 10.0)
     B, columns, latent = len(seg.run), NUM_BASE + sum(t.size for t in terms), 6 + 3 * plant.knots
-    P = np.broadcast_to(0.0, (6, B, latent + columns + 1, latent + columns + 1))
+    size = latent + columns + 1
+    P, G = np.zeros((B, length(size))), np.broadcast_to(0.0, (B, size, size))
     slope = np.zeros((B, columns + 1))
     products = Products(
-        P, plant.knots, plant.knot_time, seg.run, seg.runs, seg.mask.sum(axis=1), np.zeros(B), np.zeros(B), slope
+        (P,) * 6, plant.knots, plant.knot_time, seg.run, seg.runs, seg.mask.sum(axis=1), np.zeros(B), np.zeros(B), slope
     )
     K_inv, K_logdet = ornstein_uhlenbeck(plant.knots, plant.knot_time, hyper.tau)
-    gram = Gram(P[0], plant.knots, K_inv, K_logdet, np.zeros(B), slope, seg.run, seg.runs)
+    gram = Gram(G, plant.knots, K_inv, K_logdet, np.zeros(B), slope, seg.run, seg.runs)
     nothing = np.broadcast_to(0.0, (seg.runs, columns + 1, columns + 1))
     reduced = Reduced(nothing, np.zeros(seg.runs), np.zeros((B, 0, 0)), np.zeros((B, latent, columns + 1)))
     point = Point(np.zeros(NUM_BASE), np.zeros((B, 6)), np.zeros((B, plant.knots, 3)))

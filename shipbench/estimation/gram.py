@@ -10,11 +10,12 @@ Source: model discrepancy of Kennedy & O'Hagan (2001) put on the force side as i
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from . import packed
 from .linalg import inverses, log_determinant
 from .thresholds import THRESHOLDS
 
@@ -34,14 +35,14 @@ class Hyper:
 
 @dataclass(frozen=True)
 class Products:
-    """Products of columns [eta, w, shared, e] per channel and segment, (6, B, Z + G + 1, Z + G + 1), before noise
-    variances apply.
+    """Products of columns [eta, w, shared, e] per channel and segment, each (B, length) of `packed` (Z + G + 1, Z + G +
+    1), before noise variances apply.
 
     run (B,): the segment's run; samples (B,): number of real samples; colour (B,): log determinant of the noise's
     correlations; initial (B,), slope (B, G + 1): as in `sloped`.
     """
 
-    P: np.ndarray
+    P: tuple[np.ndarray, ...]
     knots: int
     spacing: float
     run: np.ndarray
@@ -54,28 +55,19 @@ class Products:
     @classmethod
     def of(
         cls,
-        Z: np.ndarray,
-        mask: np.ndarray,
+        P: Sequence[np.ndarray],
+        size: int,
+        samples: np.ndarray,
         knots: int,
         spacing: float,
         run: np.ndarray,
         runs: int,
         colour: np.ndarray | None = None,
     ) -> Products:
-        """Products of columns Z (6, B, K + 1, Z + G + 1), zero where `mask` (B, K + 1) has no real sample."""
-        B, P = len(mask), np.swapaxes(Z, 2, 3) @ Z
-        slope = np.zeros((B, P.shape[-1] - 6 - 3 * knots))
-        return cls(
-            P,
-            knots,
-            spacing,
-            run,
-            runs,
-            mask.sum(axis=1),
-            np.zeros(B) if colour is None else colour,
-            np.zeros(B),
-            slope,
-        )
+        """Products, packed, of columns of this size Z + G + 1 at so many `samples` (B,) of each segment."""
+        nothing = np.zeros((len(samples), size - 6 - 3 * knots))
+        logdet = np.zeros(len(samples)) if colour is None else colour
+        return cls(tuple(P), knots, spacing, run, runs, samples, logdet, np.zeros(len(samples)), nothing)
 
     @property
     def latent(self) -> int:
@@ -83,33 +75,22 @@ class Products:
 
     @property
     def shared(self) -> int:
-        return self.P.shape[-1] - self.latent - 1
+        return self.slope.shape[1] - 1
 
-    def take(self, rows: np.ndarray, runs: np.ndarray) -> Products:
-        """Products of some segments; `runs` are the indices of the runs that are kept, which are renumbered."""
-        new = np.searchsorted(runs, self.run[rows])
-        return replace(
-            self, P=self.P[:, rows], run=new, runs=len(runs), samples=self.samples[rows], colour=self.colour[rows],
-            initial=self.initial[rows],
-            slope=self.slope[rows],
-        )  # fmt: skip
+    @property
+    def size(self) -> int:
+        """Number of columns, Z + G + 1."""
+        return self.latent + self.slope.shape[1]
 
     def without(self, num: int) -> Products:
         """Products without the last `num` shared columns."""
-        if not num:
-            return self
-        end = self.P.shape[-1] - 1 - num
-        P = np.empty((*self.P.shape[:2], end + 1, end + 1))  # in the order of its axes, in which it is read often
-        P[..., :end, :end], P[..., end, end] = self.P[..., :end, :end], self.P[..., -1, -1]
-        P[..., :end, end], P[..., end, :end] = self.P[..., :end, -1], self.P[..., -1, :end]
-        return replace(self, P=P, slope=np.delete(self.slope, np.s_[-1 - num : -1], axis=1))
+        return self if not num else self.only(np.arange(self.shared - num))
 
     def only(self, columns: np.ndarray) -> Products:
         """Products of some shared columns alone (and the residual)."""
-        keep = np.concatenate([np.arange(self.latent), self.latent + columns, [self.P.shape[-1] - 1]])
-        return replace(
-            self, P=self.P.take(keep, axis=2).take(keep, axis=3), slope=self.slope[:, keep[self.latent :] - self.latent]
-        )
+        keep = np.concatenate([np.arange(self.latent), self.latent + columns, [self.size - 1]])
+        P = tuple(packed.only(part, self.size, keep) for part in self.P)
+        return replace(self, P=P, slope=self.slope[:, keep[self.latent :] - self.latent])
 
     def sloped(self, slopes: np.ndarray, at: np.ndarray, initial: np.ndarray) -> Products:
         """Products without the part (B,) of the log determinants that belongs to initial states, and with derivatives
@@ -124,9 +105,7 @@ class Products:
 
     def weigh(self, hyper: Hyper) -> Gram:
         """Gram matrices under the noise variances of `hyper`."""
-        G = (np.exp(-hyper.log_noise) @ self.P.reshape(6, -1)).reshape(
-            self.P.shape[1:]
-        )  # BLAS, which einsum does without
+        G = packed.weighed(self.P, np.exp(-hyper.log_noise), self.size)
         K_inv, K_logdet = ornstein_uhlenbeck(self.knots, self.spacing, hyper.tau)
         log_noise = self.samples * float(np.sum(hyper.log_noise)) + self.colour - self.initial
         return Gram(G, self.knots, K_inv, K_logdet, log_noise, self.slope, self.run, self.runs)
@@ -343,10 +322,8 @@ def update_noise(
     They are conditional on the shared coefficients. Those are few beside the samples, and the errors of the latent
     force cancel the errors that they cause.
     """
-    theta = coefficients_of(gram, prior, solution, estimate, products.P.shape[-1])
-    second = theta[:, :, None] * theta[:, None, :]
-    second[:, : gram.latent, : gram.latent] += reduced.inverse
-    squares = products.P.reshape(6, -1) @ second.ravel()
+    theta = coefficients_of(gram, prior, solution, estimate, products.size)
+    squares = packed.contracted(products.P, theta, reduced.inverse)
     variances = np.where(squares > 0.0, squares / np.sum(products.samples), 1.0)
     return np.maximum(np.log(variances), floor)
 

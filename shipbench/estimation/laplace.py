@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import pairwise
 
 import numpy as np
 
@@ -34,10 +33,9 @@ from .log_determinant import coefficients_at, slopes
 from .noise import Colour
 from .term import Term
 from .thresholds import THRESHOLDS
+from .whitening import products_of
 
 _EM_CYCLES = 3
-_GREATEST = 1e100
-"""Greatest value whose products are taken; a trajectory beyond it has diverged."""
 
 
 @dataclass(frozen=True)
@@ -142,58 +140,6 @@ class Fit:
         """Shared columns of the model's index-th term."""
         at = NUM_BASE + sum(t.size for t in self.model.terms[:index])
         return np.arange(at, at + self.model.terms[index].size)
-
-
-def products_of(
-    plant: Plant, scales: Scales, point: Point, columns: Columns, channels: Sequence[int] = range(6)
-) -> Products:
-    """Products of `whitened` columns, of some channels."""
-    Z, seg = whitened(plant, scales, point, columns, channels), plant.seg
-    return Products.of(
-        Z,
-        seg.mask,
-        plant.knots,
-        plant.knot_time,
-        seg.run,
-        seg.runs,
-        scales.colour.log_determinant(seg.mask.sum(axis=1)),
-    )
-
-
-@np.errstate(over="ignore", invalid="ignore")
-def whitened(
-    plant: Plant, scales: Scales, point: Point, columns: Columns, channels: Sequence[int] = range(6)
-) -> np.ndarray:
-    """Whitened columns [eta, w, base, own, candidates, e] (channels, B, K + 1, ...) in units of the scales; e is the
-    residual with all linear contributions added back, so that all terms compete anew."""
-    seg, B = plant.seg, len(point.eta)
-    e = (seg.states[..., :6] - columns.predicted).reshape(B, -1)
-    e = (
-        e
-        + _times(columns.eta, point.eta)
-        + _times(columns.w, np.moveaxis(point.w, -1, 1).reshape(B, -1))
-        + columns.base @ point.base
-    )
-    for term, value, own in zip(point.terms, point.values, columns.own, strict=True):
-        e = e + _times(own, value[seg.run] if term.per_run else np.broadcast_to(value, (B, term.size)))
-    blocks = [columns.eta, columns.w, columns.base, *columns.own, *columns.candidates, e[..., None]]
-    edges = np.cumsum([0, *(block.shape[-1] for block in blocks)])
-    Z = np.empty((len(channels), B, plant.steps + 1, edges[-1]))
-    for block, (low, high) in zip(blocks, pairwise(edges), strict=True):
-        by_channel = np.moveaxis(block.reshape(B, plant.steps + 1, 6, -1), 2, 0)
-        for at, channel in enumerate(channels):
-            np.divide(by_channel[channel], scales.noise[channel], out=Z[at, ..., low:high])
-    if not np.isfinite(np.vdot(Z, Z)):
-        Z[~(np.abs(Z) < _GREATEST)] = 0.0
-    scales.colour.whiten(Z, channels)
-    Z[:, ~seg.mask] = 0.0
-    Z[~seg.seen[list(channels)]] = 0.0
-    return Z
-
-
-def _times(columns: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Products (B, T) of columns (B, T, C) and coefficients (B, C)."""
-    return (columns @ values[:, :, None])[..., 0]
 
 
 def point_from(model: Model, point: Point, solution: Solution, prior: Prior, estimate: np.ndarray) -> Point:
@@ -322,9 +268,10 @@ def evidence_with(found: Fit, colour: Colour) -> float:
     """Log evidence of the same linearisation under another noise model, with its variances fitted anew."""
     other = colour.differs(found.scales.colour)
     part = products_of(found.plant, found.scales.coloured(colour), found.point, found.columns, other)
-    P = found.products.P.copy()
-    P[other] = part.P
-    products = replace(found.products, P=P, colour=part.colour).without(sum(t.size for t in found.candidates))
+    known = dict(enumerate(found.products.P)) | dict(zip(other, part.P, strict=True))
+    products = replace(found.products, P=tuple(known.values()), colour=part.colour).without(
+        sum(t.size for t in found.candidates)
+    )
     hyper, log_tau2 = _variances(products, found.model, found.hyper, found.log_tau2, 1)
     return solve(products.weigh(hyper).reduce(hyper.log_force), found.model.prior(log_tau2)).log_evidence
 

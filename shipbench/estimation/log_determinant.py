@@ -37,7 +37,7 @@ def slopes(lin: Linearisation, columns: Columns, inverse: np.ndarray, hyper: Hyp
     phi = phi.reshape(B, -1, 6, Z)
     from_eta = inverse[:, :6]
     of_force = inverse - np.swapaxes(from_eta, 1, 2) @ np.linalg.solve(from_eta[:, :, :6], from_eta)
-    weight = _by_noise(lin, hyper, phi) @ of_force[:, None]
+    weight = (_by_noise(lin, hyper, phi).reshape(B, -1, Z) @ of_force).reshape(phi.shape)
     by_rate = _by_rate(lin, phi, weight)
     turned = len(ASIDE) * np.take_along_axis(by_rate, lin.turn[..., None, None], axis=-1)[..., 0] / lin.away[..., None]
     found = [
@@ -62,9 +62,7 @@ def _finite(values: np.ndarray) -> np.ndarray:
 def _by_noise(lin: Linearisation, hyper: Hyper, phi: np.ndarray) -> np.ndarray:
     """Product R^-1 Phi, (B, K + 1, 6, Z)."""
     colour, precision = lin.scales.colour, np.exp(-hyper.log_noise) / lin.scales.noise**2
-    return colour.unwhitened(
-        colour.whitened(phi) * (lin.plant.seg.mask[..., None] * lin.plant.seg.seen * precision)[..., None]
-    )
+    return colour.weighted(phi, lin.plant.seg.mask[..., None] * (lin.plant.seg.seen * precision))
 
 
 def _by_rate(lin: Linearisation, phi: np.ndarray, weight: np.ndarray) -> np.ndarray:

@@ -80,18 +80,16 @@ class Colour:
         """Whiten some channels in place; values (channels, B, K + 1, ...) have the channel first."""
         for at, channel in enumerate(channels):
             if self.share[channel] > 0.0:
-                values[at] = np.einsum("kl,bl...->bk...", self.factor[channel], values[at], optimize=True)
+                values[at] = _along_samples(self.factor[channel], values[at])
 
-    def unwhitened(self, values: np.ndarray) -> np.ndarray:
-        """Values (B, K + 1, 6, ...) multiplied by the transposed whitening matrix; themselves where the noise is
-        white."""
-        if not self.share.any():
-            return values
-        out = values.copy()
+    def weighted(self, values: np.ndarray, weights: np.ndarray) -> np.ndarray:
+        """Values (B, K + 1, 6, C) multiplied by the whitening matrix, by weights (B, K + 1, 6), and by the transposed
+        whitening matrix: by the inverse of the noise's covariance."""
+        out = values * weights[..., None]
         for channel in np.flatnonzero(self.share > 0.0):
-            out[:, :, channel] = np.einsum(
-                "kl,bk...->bl...", self.factor[channel], values[:, :, channel], optimize=True
-            )
+            white = _along_samples(self.factor[channel], values[:, :, channel])
+            white *= weights[:, :, channel, None]
+            out[:, :, channel] = _along_samples(self.factor[channel].T, white)
         return out
 
     def differs(self, other: Colour) -> list[int]:
@@ -102,6 +100,11 @@ class Colour:
     def log_determinant(self, lengths: np.ndarray) -> np.ndarray:
         """Log determinant (B,) of the covariance of all channels, for segments of `lengths` samples."""
         return np.asarray(self.logdet[:, lengths].sum(axis=0))
+
+
+def _along_samples(matrix: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Products (B, K + 1, ...) of a matrix (K + 1, K + 1) and values of every segment."""
+    return values @ matrix.T if values.ndim == 2 else matrix @ values
 
 
 def _correlation(lag: np.ndarray, time: float, period: float, smooth: bool) -> np.ndarray:

@@ -15,6 +15,7 @@ from shipbench.estimation.gram import (
     ornstein_uhlenbeck,
     solve,
 )
+from shipbench.estimation.packed import pack
 
 
 def test_the_evidence_is_that_of_the_joint_gaussian():
@@ -22,9 +23,9 @@ def test_the_evidence_is_that_of_the_joint_gaussian():
     knots, G, T = 3, 2, 6 * 5
     Z = rng.standard_normal((2, T, 6 + 3 * knots + G + 1))
     hyper = Hyper(np.array([0.1, -0.3, 0.2]), rng.normal(0.0, 0.2, 6), 2.0)
-    gram = Products.of(
-        np.moveaxis(Z.reshape(2, 5, 6, -1), 2, 0), np.ones((2, 5), dtype=bool), knots, 1.0, np.array([0, 1]), 2
-    ).weigh(hyper)
+    by_channel = np.moveaxis(Z.reshape(2, 5, 6, -1), 2, 0)
+    P = pack(np.swapaxes(by_channel, 2, 3) @ by_channel)
+    gram = Products.of(P, Z.shape[2], np.array([5, 5]), knots, 1.0, np.array([0, 1]), 2).weigh(hyper)
     prior = Prior(np.array([0]), np.array([0.7]), np.array([1]), np.array([0.4]))
     found = solve(gram.reduce(hyper.log_force), prior).log_evidence
     K = np.linalg.inv(ornstein_uhlenbeck(knots, 1.0, 2.0)[0])

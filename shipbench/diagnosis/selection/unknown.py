@@ -13,9 +13,10 @@ from ...estimation.budget import is_spent
 from ...estimation.columns import Bend, Columns
 from ...estimation.gauss_newton import fit
 from ...estimation.gram import Gram, Prior, beside_products, ornstein_uhlenbeck, solve
-from ...estimation.laplace import Fit, products_of, settled_evidence, sloped, whitened
+from ...estimation.laplace import Fit, settled_evidence, sloped
 from ...estimation.linearisation import Linearisation
 from ...estimation.log_determinant import coefficients_at, slopes
+from ...estimation.whitening import products_of, whitened
 from ..thresholds import THRESHOLDS
 from .features import Feature, of_forces, of_sensors
 from .screening import evidence
