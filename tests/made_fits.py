@@ -79,7 +79,7 @@ def _around(plant: Plant, terms: tuple[Term, ...], solution: Solution) -> Fit:
     point = Point(np.zeros(NUM_BASE), np.zeros((B, 6)), np.zeros((B, plant.knots, 3)))
     T = 6 * (plant.steps + 1)
     sensitivities = Columns(
-        np.zeros((B, plant.steps + 1, 6)), np.zeros((B, T, 6)), np.zeros((B, T, 3 * plant.knots)),
+        np.zeros((B, plant.steps + 1, 6)), np.zeros((B, T, latent)),
         np.zeros((B, T, NUM_BASE)), tuple(np.zeros((B, T, t.size)) for t in terms), (), (),
     )  # fmt: skip
     return Fit(

@@ -154,9 +154,10 @@ def refined(plant: Plant, scales: Scales, start: Calibration) -> Calibration:
         J = np.concatenate([base, *own], axis=-1) * weights[:, :, None]
         e = errors(lin) * weights
         ok = np.isfinite(J).all(axis=(1, 2)) & np.isfinite(e).all(axis=1)
-        H = np.einsum("bti,btj->ij", J[ok], J[ok]) + np.diag(free)
-        cov, share, before = np.linalg.inv(H), 1.0, old
-        step, start = cov @ (np.einsum("bti,bt->i", J[ok], e[ok]) - free * at), replace(start, cov=cov)
+        J, e = (J, e) if ok.all() else (J[ok], e[ok])
+        J = J.reshape(-1, J.shape[2])
+        cov, share, before = np.linalg.inv(J.T @ J + np.diag(free)), 1.0, old
+        step, start = cov @ (J.T @ e.ravel() - free * at), replace(start, cov=cov)
         while share > _LEAST_SHARE:
             moved = _unstacked(start, at + share * step)
             trial = rolled(plant, scales, moved)

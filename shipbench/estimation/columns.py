@@ -16,17 +16,26 @@ ASIDE, AWAY = (2, 3, 4, 5), 0.01
 class Columns:
     """Sensitivities about a point, T = 6 (K + 1) rows with the channel last.
 
-    Shapes: eta (B, T, 6); w (B, T, 3 knots); base (B, T, NUM_BASE); one (B, T, size) per term of the point (`own`) and
-    one per candidate; predicted (B, K + 1, 6).
+    Shapes: latent (B, T, 6 + 3 knots) of [eta, w]; base (B, T, NUM_BASE); one (B, T, size) per term of the point
+    (`own`) and one per candidate; predicted (B, K + 1, 6).
     """
 
     predicted: np.ndarray
-    eta: np.ndarray
-    w: np.ndarray
+    latent: np.ndarray
     base: np.ndarray
     own: tuple[np.ndarray, ...]
     candidates: tuple[np.ndarray, ...]
     bends: tuple[Bend, ...]
+
+    @property
+    def eta(self) -> np.ndarray:
+        """Sensitivities (B, T, 6) to the initial states."""
+        return self.latent[..., :6]
+
+    @property
+    def w(self) -> np.ndarray:
+        """Sensitivities (B, T, 3 knots) to the latent force."""
+        return self.latent[..., 6:]
 
 
 @dataclass(frozen=True)

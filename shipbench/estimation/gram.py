@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -171,17 +172,18 @@ class Gram:
 
     def reduce(self, log_force: np.ndarray) -> Reduced:
         """Integrate eta and w out of every segment and sum over the segments of a run."""
-        Z = self.latent
-        A = self.G[:, :Z, :Z] + self.precision(log_force)
-        inverse, logdet = inverses(A)
-        solved = inverse @ self.G[:, :Z, Z:]
-        S = self.G[:, Z:, Z:] - np.swapaxes(self.G[:, :Z, Z:], 1, 2) @ solved
-        S[:, :-1, -1] += self.slope[:, :-1]
-        S[:, -1, :] += self.slope
+        Z, runs = self.latent, np.flatnonzero(np.diff(self.run, prepend=-1))
+        inverse, logdet = inverses(self.G[:, :Z, :Z] + self.precision(log_force))
+        right, S = np.ascontiguousarray(self.G[:, :Z, Z:]), by_run(self.G[:, Z:, Z:], self.run)
+        solved, slope = inverse @ right, by_run(self.slope, self.run)
+        for i, (a, b) in enumerate(pairwise([*runs, len(self.run)])):  # one product a run: its sum over the segments
+            S[i] -= right[a:b].reshape(-1, S.shape[2]).T @ solved[a:b].reshape(-1, S.shape[2])
+        S[:, :-1, -1] += slope[:, :-1]
+        S[:, -1, :] += slope
         logdet = (
             logdet + self.knots * np.sum(log_force) + 3 * self.K_logdet + self.log_noise - 6 * np.log(ETA_PRECISION)
         )
-        return Reduced(by_run(S, self.run), by_run(logdet, self.run), inverse, solved)
+        return Reduced(S, by_run(logdet, self.run), inverse, solved)
 
 
 @dataclass(frozen=True)

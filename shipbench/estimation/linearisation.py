@@ -155,11 +155,10 @@ class Linearisation:
         self._look_aside()
         base, own = self.parameter_columns()
         self.pulses = self._pulses()
-        first = np.broadcast_to(np.diag(self.scales.eta), (self.here.shape[1], 6, 6))
-        eta, latent = self._chained(np.zeros((*self.here.shape, 6)), first), self._chained(self.pulses)
-        return Columns(
-            self.predicted, eta, latent, base, own, tuple(self._of_candidates(candidates)), tuple(self.bends)
-        )
+        first = np.zeros((self.here.shape[1], 6, 6 + self.pulses.shape[-1]))
+        first[..., :6] = np.diag(self.scales.eta)
+        latent = self._chained(np.concatenate([np.zeros((*self.here.shape, 6)), self.pulses], axis=-1), first)
+        return Columns(self.predicted, latent, base, own, tuple(self._of_candidates(candidates)), tuple(self.bends))
 
     @_quiet
     def parameter_columns(self, free: Sequence[int] = range(NUM_BASE)) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:

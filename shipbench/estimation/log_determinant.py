@@ -32,7 +32,7 @@ def slopes(lin: Linearisation, columns: Columns, inverse: np.ndarray, hyper: Hyp
     `inverse` (B, Z, Z) is that of [eta, w], which holds A^-1 once eta is known. Phi is a chain of single steps, so that
     the derivative by the Jacobian of each comes from an adjoint one. A trial that diverges has none.
     """
-    phi = _finite(np.concatenate([columns.eta, columns.w], axis=-1))
+    phi = columns.latent if np.isfinite(np.vdot(columns.latent, columns.latent)) else _finite(columns.latent.copy())
     B, _, Z = phi.shape
     phi = phi.reshape(B, -1, 6, Z)
     from_eta = inverse[:, :6]

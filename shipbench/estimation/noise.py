@@ -87,9 +87,12 @@ class Colour:
         whitening matrix: by the inverse of the noise's covariance."""
         out = values * weights[..., None]
         for channel in np.flatnonzero(self.share > 0.0):
-            white = _along_samples(self.factor[channel], values[:, :, channel])
-            white *= weights[:, :, channel, None]
-            out[:, :, channel] = _along_samples(self.factor[channel].T, white)
+            factor, weight = self.factor[channel], weights[:, :, channel, None]
+            if np.all(weight == weight[:, :1]):
+                np.matmul(factor.T @ factor, values[:, :, channel], out=out[:, :, channel])
+                out[:, :, channel] *= weight
+            else:
+                np.matmul(factor.T, (factor @ values[:, :, channel]) * weight, out=out[:, :, channel])
         return out
 
     def differs(self, other: Colour) -> list[int]:

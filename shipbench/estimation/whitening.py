@@ -59,16 +59,12 @@ def whitened(
 def _blocks(plant: Plant, point: Point, columns: Columns) -> list[np.ndarray]:
     """Blocks (B, T, C) of the columns, in the order of `whitened`."""
     seg, B = plant.seg, len(point.eta)
+    beside = np.concatenate([point.eta, np.moveaxis(point.w, -1, 1).reshape(B, -1)], axis=1)
     e = (seg.states[..., :6] - columns.predicted).reshape(B, -1)
-    e = (
-        e
-        + _times(columns.eta, point.eta)
-        + _times(columns.w, np.moveaxis(point.w, -1, 1).reshape(B, -1))
-        + columns.base @ point.base
-    )
+    e = e + _times(columns.latent, beside) + columns.base @ point.base
     for term, value, own in zip(point.terms, point.values, columns.own, strict=True):
         e = e + _times(own, value[seg.run] if term.per_run else np.broadcast_to(value, (B, term.size)))
-    return [columns.eta, columns.w, columns.base, *columns.own, *columns.candidates, e[..., None]]
+    return [columns.latent, columns.base, *columns.own, *columns.candidates, e[..., None]]
 
 
 def _times(columns: np.ndarray, values: np.ndarray) -> np.ndarray:
