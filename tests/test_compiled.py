@@ -132,6 +132,21 @@ def test_lanes_are_the_function_on_everything_spread_over_them(compiler, carried
             np.testing.assert_allclose(out[d, k, b], state, rtol=1e-9, atol=1e-11)
 
 
+@pytest.mark.parametrize("alone", [None, 0, 1, 2])
+@pytest.mark.parametrize("turning", [0, 1, 2])
+def test_what_is_shared_by_all_directions_is_computed_once_and_the_same(compiler, alone, turning):
+    """Of a function that is no step, with one bundle that differs between directions: that of `alone`, or another."""
+    step, rng, (D, K, B) = every_operation(), np.random.default_rng(1), (5, 3, 11)
+    given = step.sx_in()
+    two = ca.Function("two", given, [step(*given)[:2]], {"cse": True})
+    x, w, p = (rng.normal(size=(D if i == turning else 1, K, B, 1, size)) for i, size in enumerate((3, 2, 2)))
+    out = np.empty((D, K, B, 2))
+    Lanes.of(two, alone)([x, w, p], (D, K, B, 1), out)
+    for d, k, b in ((0, 0, 0), (4, 2, 10), (1, 1, 7), (3, 0, 8)):
+        one = [a[d if i == turning else 0, k, b, 0] for i, a in enumerate((x, w, p))]
+        np.testing.assert_allclose(out[d, k, b], two(*one).full().ravel(), rtol=1e-9, atol=1e-11)
+
+
 def test_lanes_that_do_not_fit_are_refused(compiler):
     given = [np.zeros(3), np.zeros(2), np.zeros(2)]
     with pytest.raises(ValueError, match="accepted"):
