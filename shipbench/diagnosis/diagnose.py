@@ -163,7 +163,7 @@ def _diagnosed(
     verdict = "unknown" if unknown else "found" if causes else "none"
     own = worth.calibration or (_on_fitted(dataset, simulation, found, seed) if rests else None)
     if own is not None:
-        differs = moved(found.selection.null if unknown else found.final, causes) if simulation is None else ()
+        differs = moved(found.selection.null if unknown else found.final, causes)
         own = replace(own, moved=differs, noise_floor=noise_floor(dataset, found.selection.null, seed))
     gained = worth.own if worth.hull and len(causes) == 1 else worth.gain
     proposed = _proposed([c.effect for c in causes if c.effect not in behind], own) if judged is None else judged.text

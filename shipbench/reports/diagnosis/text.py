@@ -205,7 +205,8 @@ def calibration_words(d: Diagnosis) -> str:
         + (f" {d.stand_in}" if d.stand_in else "")
         + (f" {floor_words(c.noise_floor)}" if c.noise_floor is not None else "")
         + "".join(
-            f" The calibrated ship's {m.coefficient} is {_changed(m.change)} than the ship file's "
+            f" The {'' if d.simulation else 'calibrated '}ship's {m.coefficient} is {_changed(m.change)} than "
+            f"{'your simulation' if d.simulation else 'the ship file'}'s "
             f"(95 %: {_between(*m.ci95, 'smaller', 'larger')})."
             for m in c.moved
         )

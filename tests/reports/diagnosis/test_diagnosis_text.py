@@ -171,3 +171,10 @@ def test_the_next_command_runs_the_simulation_beside_its_correction():
 
 def test_a_stand_in_is_said():
     assert calibration_words(judged(stand_in="Only trajectories are known.")).endswith("Only trajectories are known.")
+
+
+def test_what_the_ship_does_otherwise_than_the_simulation_is_said():
+    own = replace(judged().calibration, moved=(Moved("speed at 90 rpm", -0.09, "1", (-0.12, -0.06), 1.8),))
+    assert "The ship's speed at 90 rpm is 9 % smaller than your simulation's" in calibration_words(
+        judged(calibration=own)
+    )
