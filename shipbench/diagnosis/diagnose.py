@@ -31,7 +31,7 @@ from .candidates import describe_candidates
 from .evaluation.held_out_gain import FoldErrors, fold_errors, of_runs, on_fitted_runs, summarise
 from .evaluation.moved import moved
 from .evaluation.noise_floor import noise_floor
-from .evaluation.own_simulation import OwnSimulation, simulation_fold_errors, simulation_on_fitted_runs
+from .evaluation.own_simulation import OwnSimulation, its_own, simulation_fold_errors, simulation_on_fitted_runs
 from .evaluation.residuals import what_is_wrong
 from .evaluation.series import trace_of
 from .explain import describe_causes, remaining, unknown_part, what_is_left
@@ -94,7 +94,7 @@ def _diagnosed(
     simulation = None if judged is None else OwnSimulation(judged, dataset)
     if simulation is not None:
         step("step the simulation from every measured state", 0.01, 0.02)
-        dataset = simulation.beside(dataset)
+        dataset, settled = simulation.beside(dataset), (*settled, *its_own())
     cautious = is_too_little(dataset)
     apart = len({run.group for run in dataset.runs}) > 1
     if not apart and len(dataset) > 1:
@@ -123,6 +123,7 @@ def _diagnosed(
         rests = not is_spent()
         if only is not None or cautious or not rests or simulation is not None:
             found = analyse(null, only=only, seed=seed, cautious=cautious or not rests)
+            found = found if simulation is None else replace(found, gears=())
         else:
             as_recorded = dataset
             found, dataset, turned, no_cause = _as_it_must_be_read(dataset, null, steps, settled, seed)

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ...effects.base import EFFECTS
 from ...estimation.beside import PUSHES, BesideSimulation
 from ...estimation.forward import Segments, cut
 from ...estimation.resampling import averaged
@@ -63,6 +64,11 @@ class OwnSimulation:
     def corrected(self, dataset: Dataset, correction: Correction) -> Rollouts:
         """Rollouts of the corrected simulation."""
         return Rollouts.of(dataset, self, correction)
+
+
+def its_own() -> tuple[str, ...]:
+    """Effects that are not searched: a simulation has actuators of its own, and its steps begin at the measured ones."""
+    return tuple(name for name in EFFECTS.names() if EFFECTS.get(name).enters == "gear")
 
 
 def without_pushes(dataset: Dataset) -> Dataset:

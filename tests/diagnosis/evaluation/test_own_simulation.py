@@ -6,7 +6,7 @@ import pickle
 
 import numpy as np
 
-from shipbench.diagnosis.evaluation.own_simulation import OwnSimulation, Rollouts, without_pushes
+from shipbench.diagnosis.evaluation.own_simulation import OwnSimulation, Rollouts, its_own, without_pushes
 from shipbench.estimation.beside import PUSHES
 from shipbench.metrics.ed import ed
 from shipbench.specs import parse_spec, spec_of
@@ -54,3 +54,8 @@ def test_another_process_makes_the_model_anew(harbour):
     assert simulation.model is simulation.model
     again = pickle.loads(pickle.dumps(simulation))
     np.testing.assert_array_equal(again.alone(harbour).errors, simulation.alone(harbour).errors)
+
+
+def test_actuator_dynamics_are_not_searched_beside_a_simulation():
+    assert {"rudder_delay", "shaft_lag", "thruster_lag"} <= set(its_own())
+    assert "current" not in its_own()
