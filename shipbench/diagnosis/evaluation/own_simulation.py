@@ -67,8 +67,8 @@ class OwnSimulation:
 
 
 def its_own() -> tuple[str, ...]:
-    """Effects that are not searched: a simulation has actuators of its own, and its steps begin at the measured ones."""
-    return tuple(name for name in EFFECTS.names() if EFFECTS.get(name).enters == "gear")
+    """Effects that are not searched: a simulation has actuators of its own, and steps from the measured positions."""
+    return tuple(name for name in EFFECTS.names() if EFFECTS.get(name).traits.gear_field)
 
 
 def without_pushes(dataset: Dataset) -> Dataset:
