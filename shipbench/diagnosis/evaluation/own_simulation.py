@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any
@@ -10,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ...effects.base import EFFECTS
+from ...errors import InputError, ShipbenchError
 from ...estimation.beside import PUSHES, BesideSimulation
 from ...estimation.forward import Segments, cut
 from ...estimation.resampling import averaged
@@ -18,6 +20,7 @@ from ...predictors.context import Context, predicted
 from ...predictors.own_simulator import Simulator
 from ...predictors.physics_model.correction import Correction, beside_simulation
 from ...records import Dataset
+from ...registry import reason
 from ...signals import MOTION
 from ...specs import Spec
 from ..result import Calibrated
@@ -39,8 +42,9 @@ class OwnSimulation:
     @cached_property
     def model(self) -> Any:
         """The model, fitted where it learns."""
-        model = make_predictor(self.spec)
-        return model if self.spec.saved else model.fit(self.known)
+        with _faults_of(self.spec):
+            model = make_predictor(self.spec)
+            return model if self.spec.saved else model.fit(self.known)
 
     def __getstate__(self) -> dict[str, Any]:
         """State without the model, whose code another process loads anew."""
@@ -48,7 +52,9 @@ class OwnSimulation:
 
     def beside(self, dataset: Dataset) -> BesideSimulation:
         """Runs with what the simulation adds to the ship file's physics (`beside_simulation`)."""
-        return beside_simulation(without_pushes(dataset), self.model)
+        model = self.model
+        with _faults_of(self.spec):
+            return beside_simulation(without_pushes(dataset), model)
 
     def of_training(self, dataset: Dataset, train: Dataset) -> tuple[OwnSimulation, Dataset]:
         """Simulation and `train` as they are where only the runs of `train` are known; `dataset` has all of them."""
@@ -64,6 +70,17 @@ class OwnSimulation:
     def corrected(self, dataset: Dataset, correction: Correction) -> Rollouts:
         """Rollouts of the corrected simulation."""
         return Rollouts.of(dataset, self, correction)
+
+
+@contextmanager
+def _faults_of(spec: Spec) -> Iterator[None]:
+    """Turn what a stranger's code raises into one message; Ctrl-C passes."""
+    try:
+        yield
+    except ShipbenchError:
+        raise
+    except (Exception, SystemExit) as error:
+        raise InputError(f"the simulation '{spec.text}' fails: {reason(error)}. Correct it.") from error
 
 
 def its_own() -> tuple[str, ...]:
@@ -106,11 +123,12 @@ class Rollouts:
             plain.ship, plain.dt, plain.inputs, tuple(r.parent for r in runs),
             np.array([r.t[k] for r, k in zip(runs, first, strict=True)]), tuple(r.began for r in runs),
         )  # fmt: skip
-        s0 = seg.states[:, 0]
-        if correction is None:
-            S = np.asarray(predicted(simulation.model, s0.copy(), U.copy(), None, context), dtype=float)
-        else:
-            S = correction.predict(simulation.model, s0, U, plain.dt, context)
+        s0, model = seg.states[:, 0], simulation.model
+        with _faults_of(simulation.spec):
+            if correction is None:
+                S = np.asarray(predicted(model, s0.copy(), U.copy(), None, context), dtype=float)
+            else:
+                S = correction.predict(model, s0, U, plain.dt, context)
         motion = np.concatenate([s0[:, None, MOTION], S[:, num - 1 :: num, MOTION]], axis=1)
         return cls(seg, motion)
 

@@ -5,8 +5,10 @@ from __future__ import annotations
 import pickle
 
 import numpy as np
+import pytest
 
 from shipbench.diagnosis.evaluation.own_simulation import OwnSimulation, Rollouts, its_own, without_pushes
+from shipbench.errors import InputError
 from shipbench.estimation.beside import PUSHES
 from shipbench.metrics.ed import ed
 from shipbench.specs import parse_spec, spec_of
@@ -59,3 +61,14 @@ def test_another_process_makes_the_model_anew(harbour):
 def test_actuator_dynamics_are_not_searched_beside_a_simulation():
     assert {"rudder_delay", "shaft_lag", "thruster_lag"} <= set(its_own())
     assert "current" not in its_own()
+
+
+@pytest.mark.parametrize(
+    "fault", ["raise RuntimeError('no licence')", "import nothing_of_this_name", "raise SystemExit(3)"]
+)
+def test_a_simulation_that_fails_is_one_message(harbour, tmp_path, fault):
+    (tmp_path / "late.py").write_text(f"def simulate(s0, U, dt):\n    {fault}\n")
+    (tmp_path / "soon.py").write_text(f"{fault}\ndef simulate(s0, U, dt):\n    return s0\n")
+    for name in ("late", "soon"):
+        with pytest.raises(InputError, match=rf"the simulation '.*{name}.py:simulate' fails: "):
+            OwnSimulation(parse_spec(f"{tmp_path / name}.py:simulate"), harbour).beside(harbour)
