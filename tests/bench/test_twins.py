@@ -132,6 +132,7 @@ def test_a_twin_on_disk_is_the_same_and_replaces_no_other_data(trial, twin, tmp_
         write_twin(replace(twin, name="other-simulated"), tmp_path / "twin")
 
 
+@pytest.mark.long
 def test_a_saved_model_the_particulars_and_a_file_make_twins(harbour, tmp_path):
     data = harbour[:3]
     sb.make_predictor("hold").fit(data).save(tmp_path / "saved")

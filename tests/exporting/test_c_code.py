@@ -39,6 +39,7 @@ def test_its_test_fails_where_a_number_differs(made, tmp_path):
     assert "FAILED: step 0, state 2" in done.stdout
 
 
+@pytest.mark.long
 def test_the_header_tells_every_channel_with_its_unit(made):
     text = c_code.header(step_of(made("physics", wind=True)), "ship")
     for words in (

@@ -26,6 +26,7 @@ def model(parts):
     return quick().fit(parts[0], parts[1], seed=1)
 
 
+@pytest.mark.long
 def test_members_of_a_group_come_out_as_they_would_alone(parts, model):
     train, valid, test = parts
     batch = test.batch()
@@ -49,6 +50,7 @@ def test_history_is_used_and_only_what_lies_before_s0(parts, model):
     np.testing.assert_array_equal(model.predict(batch.s0, batch.U, empty), model.predict(batch.s0, batch.U))
 
 
+@pytest.mark.long
 def test_trained_on_twelve_runs_it_comes_closer_than_kept_velocities(parts):
     train, valid, test = parts
     batch = valid.merged(test).batch()
@@ -102,6 +104,7 @@ def test_wrong_settings_and_use_before_fit_are_refused(parts):
         LSTM().predict(batch.s0, batch.U)
 
 
+@pytest.mark.long
 def test_a_warm_start_goes_on_from_the_last_fit_in_its_scales(parts, model):
     train, valid, batch = parts[0], parts[1], parts[2].batch()
     still = LSTM(hidden=model.hidden, epochs=4, lr=1e-12)

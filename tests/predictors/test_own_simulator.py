@@ -69,7 +69,9 @@ def test_a_setting_reaches_the_function(file, harbour):
     assert not np.allclose(predicted(f"{file}:whole[speed=2.0]", harbour), predicted(f"{file}:whole", harbour))
 
 
-@pytest.mark.parametrize("name", ["whole", "one", "asks", "Mine"])
+@pytest.mark.parametrize(
+    "name", ["asks", *(pytest.param(name, marks=pytest.mark.long) for name in ("whole", "one", "Mine"))]
+)
 def test_no_rule_of_the_contract_is_broken(file, name):
     assert not check_model(f"{file}:{name}").of("broken")
 

@@ -40,6 +40,7 @@ def study(data, folder, out, **more):
     return sb.benchmark([f"predictions:{folder}", "hold"], data, out=out, **LINES, **more)
 
 
+@pytest.mark.long
 def test_windows_that_are_not_covered_are_skipped_and_the_others_scored(data, half, tmp_path, undrawn):
     model = f"predictions:{half}"
     models = {name: name for name in (model, "hold")} | {"still": lambda s0, U, dt: np.repeat(s0[:, None], 20, axis=1)}

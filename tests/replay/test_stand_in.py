@@ -21,6 +21,7 @@ def theirs(harbour, tmp_path):
     return parse_spec(f"predictions:{tmp_path / 'theirs'}")
 
 
+@pytest.mark.long
 def test_the_stand_in_follows_the_trajectories_and_says_how_closely(harbour, theirs):
     spec, note = stand_in(theirs, harbour)
     assert spec.text == theirs.text

@@ -62,6 +62,7 @@ def imported(tmp_path):
     return run
 
 
+@pytest.mark.long
 def test_all_files_give_the_loaders_samples(imported):
     pairs = imported("*/*.csv.gz", top="antialias = false")
     assert len(pairs) == 33
@@ -71,6 +72,7 @@ def test_all_files_give_the_loaders_samples(imported):
         np.testing.assert_allclose(ours.inputs, theirs.inputs, atol=1e-8)
 
 
+@pytest.mark.long
 def test_speeds_from_the_measured_track_agree_with_the_published_ones(imported):
     for ours, theirs in imported("turning/turn_14-Oct-2020_14_[01]*.csv.gz", without=("u", "v", "r")):
         # The published u and v lag the position by 0.6 s (the data's README).
