@@ -277,7 +277,6 @@ def background_cov(gram: Gram, reduced: Reduced, prior: Prior, solution: Solutio
     )
 
 
-@np.errstate(over="ignore", invalid="ignore")  # a trajectory that diverges
 def update_force(gram: Gram, reduced: Reduced, prior: Prior, solution: Solution, estimate: np.ndarray) -> np.ndarray:
     """Log variances (3,) of the latent force after one EM step.
 
