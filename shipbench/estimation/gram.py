@@ -243,7 +243,6 @@ def shared_alone(reduced: Reduced, prior: Prior) -> tuple[np.ndarray, np.ndarray
     return S - np.swapaxes(right, 1, 2) @ back, reduced.logdet + log_determinant(A) + np.sum(prior.log_tau2), covs, back
 
 
-@np.errstate(over="ignore", invalid="ignore")  # a trajectory that diverges
 def solve(reduced: Reduced, prior: Prior) -> Solution:
     """Integrate the random effects and the shared coefficients out."""
     S, logdet, covs, back = shared_alone(reduced, prior)
