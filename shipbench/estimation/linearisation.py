@@ -154,10 +154,10 @@ class Linearisation:
         """All sensitivities."""
         self._look_aside()
         base, own = self.parameter_columns()
-        sources = self._pulses()
-        self.pulses, first = sources[..., 6:], np.zeros((self.here.shape[1], 6, sources.shape[-1]))
+        self.pulses = self._pulses()
+        first = np.zeros((self.here.shape[1], 6, 6 + self.pulses.shape[-1]))
         first[..., :6] = np.diag(self.scales.eta)
-        latent = self._chained(sources, first)
+        latent = self._chained(np.concatenate([np.zeros((*self.here.shape, 6)), self.pulses], axis=-1), first)
         return Columns(self.predicted, latent, base, own, tuple(self._of_candidates(candidates)), tuple(self.bends))
 
     @_quiet
@@ -223,16 +223,9 @@ class Linearisation:
     def _changed(self, unit: float, **change: Any) -> tuple[np.ndarray, np.ndarray]:
         """Changes (D, K, B, 3) of the accelerations by a change of something, per unit: on the trajectory, and beside
         it less those on it. The second is empty where the derivatives of the log determinant are not needed."""
-        on = self._rates(**change)
-        on -= self.rates
-        on /= unit
-        if self.aside is None:
-            return on, np.zeros_like(on)
-        aside = self._rates(**change, states=self.aside)
-        aside -= self.rates_aside
-        aside /= unit
-        aside -= on
-        return on, aside
+        on = self._rates(**change) - self.rates
+        aside = on if self.aside is None else self._rates(**change, states=self.aside) - self.rates_aside
+        return on / unit, (aside - on) / unit
 
     def _ends(self, rates: np.ndarray) -> np.ndarray:
         """Changes (K, B, 6, D) of the steps' ends by changes of the acceleration (D, K, B, 3). It takes one evaluation
@@ -240,15 +233,10 @@ class Linearisation:
         return np.asarray(self.reach @ np.moveaxis(rates, 0, -1))
 
     def _pulses(self) -> np.ndarray:
-        """Change of each step's end by each initial state, which is none, and by each knot of the latent acceleration,
-        (K, B, 6, 6 + 3 knots)."""
-        middle, ends = (
-            0.5 * (self.plant.hat[:-1] + self.plant.hat[1:]),
-            np.zeros((*self.here.shape, 6 + 3 * self.plant.knots)),
-        )
-        by_axis = ends[..., 6:].reshape(*self.here.shape, 3, -1)  # a view
-        np.multiply((self.reach * self.scales.w)[..., None], middle[:, None, None, None, :], out=by_axis)
-        return ends
+        """Change of each step's end by each knot of the latent acceleration, (K, B, 6, 3 knots)."""
+        middle = 0.5 * (self.plant.hat[:-1] + self.plant.hat[1:])
+        ends = (self.reach * self.scales.w)[..., None] * middle[:, None, None, None, :]
+        return np.asarray(ends.reshape(*self.here.shape, -1))
 
     def _chain(self, sources: np.ndarray, first: np.ndarray | None = None) -> np.ndarray:
         """Change of the motion (B, K + 1, 6, D) from changes of the steps' ends (K, B, 6, D) and of the initial states
