@@ -9,7 +9,7 @@ from ..effects.base import EFFECTS
 from ..errors import InputError, ShipbenchError
 from ..predictors._saved import Origin, read_meta
 from ..predictors._user_file import code_of
-from ..predictors.base import PREDICTORS, make_predictor
+from ..predictors.base import PREDICTORS, learns, make_predictor
 from ..registry import package_digest, reason
 from ..replay.reading import files_of
 from ..specs import Spec
@@ -57,11 +57,6 @@ class _Made(NamedTuple):
     origin: Origin | None
     learns: bool
     warm: bool
-
-
-def learns(spec: Spec, model: Any) -> bool:
-    """Whether the fit of a model learns from the runs: not where it comes fitted, is a simulator, or says so."""
-    return not spec.saved and not spec.reader and getattr(model, "learns", True) is not False
 
 
 def facts_of(spec: Spec) -> ModelFacts:

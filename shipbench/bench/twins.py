@@ -20,13 +20,13 @@ from ..errors import InputError, ShipbenchError, WorkError, option
 from ..names import LONGEST
 from ..predictors._saved import check_origin
 from ..predictors._user_file import on_import_path
-from ..predictors.base import make_predictor
+from ..predictors.base import learns, make_predictor
 from ..predictors.context import Context, predicted
 from ..records import LARGEST, Dataset, Run
 from ..registry import reason
 from ..signals import ACTUATORS, PSI, STATES, X, Y
 from ..specs import Spec, spec_of
-from .models import ModelFacts, learns
+from .models import ModelFacts
 from .task import BOTH, MEASURED, SIMULATED, Task
 from .work import FoldData
 

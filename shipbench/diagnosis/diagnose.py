@@ -22,7 +22,7 @@ from ..estimation.forward import FOLD_STEPS, MOST_STEPS, THOROUGH_STEPS, Plant, 
 from ..estimation.gauss_newton import Fit
 from ..estimation.noise_selection import noise_in_words
 from ..estimation.outliers import left_out
-from ..predictors.physics_model.correction import Correction, correctable
+from ..predictors.physics_model.correction import correctable
 from ..processes import process_pool
 from ..records import Dataset
 from ..specs import Spec
@@ -31,7 +31,7 @@ from .candidates import describe_candidates
 from .evaluation.held_out_gain import FoldErrors, fold_errors, of_runs, on_fitted_runs, summarise
 from .evaluation.moved import moved
 from .evaluation.noise_floor import noise_floor
-from .evaluation.own_simulation import OwnSimulation, its_own, simulation_fold_errors, simulation_on_fitted_runs
+from .evaluation.own_simulation import Judged, OwnSimulation, its_own, simulation_fold_errors
 from .evaluation.residuals import what_is_wrong
 from .evaluation.series import trace_of
 from .explain import describe_causes, remaining, unknown_part, what_is_left
@@ -158,11 +158,11 @@ def _diagnosed(
     lines += what_is_left(found) if causes and not doubts else []
     lines += odd_for(found, [c.effect for c in causes]) if by_file and not doubts else []
     step("predict every run", 0.96, 1.0)
-    correction, rollouts = (None, None) if simulation is None else _of_simulation(dataset, simulation, found)
-    trace = trace_of(dataset, found, rollouts)
+    of_all = None if simulation is None else Judged.of(dataset, simulation, [c.effect for c in causes])
+    trace = trace_of(dataset, found, None if of_all is None else (of_all.alone.motion, of_all.corrected.motion))
     unknown = (bool(doubts) and not causes) or (found.unknown is not None and not units)
     verdict = "unknown" if unknown else "found" if causes else "none"
-    own = worth.calibration or (_on_fitted(dataset, simulation, found, seed) if rests else None)
+    own = worth.calibration or (_on_fitted(dataset, simulation, of_all, found, seed) if rests else None)
     if own is not None:
         differs = moved(found.selection.null if unknown else found.final, causes)
         own = replace(own, moved=differs, noise_floor=noise_floor(dataset, found.selection.null, seed))
@@ -176,7 +176,8 @@ def _diagnosed(
         extended_model=proposed, fingerprint=fingerprint, seconds=time.perf_counter() - began,
         warnings=tuple(lines), gain=gained if causes else None, unknown=unknown_part(found),
         gain_per_run=worth.per_run if causes else (), trace=trace,
-        calibration=own, simulation="" if judged is None else judged.text, correction=correction,
+        calibration=own, simulation="" if judged is None else judged.text,
+        correction=None if of_all is None else of_all.correction,
     )  # fmt: skip
 
 
@@ -213,23 +214,12 @@ def _proposed(causes: Sequence[str], calibration: Calibrated | None) -> str:
     return "+".join(["calibrated", *names]) if names or pays else "physics"
 
 
-def _corrected_by(found: Analysis) -> tuple[str, ...]:
-    """Causes that the correction of a simulation holds; none where an unknown one is reported."""
-    return () if found.unknown is not None else correctable([t.effect.name for t in found.final.model.terms])
-
-
-def _of_simulation(
-    dataset: Dataset, simulation: OwnSimulation, found: Analysis
-) -> tuple[Correction, tuple[np.ndarray, np.ndarray]]:
-    """Correction of a simulation by all runs, and its rollouts without and with it."""
-    correction = Correction.fit(dataset, _corrected_by(found))
-    return correction, (simulation.alone(dataset).motion, simulation.corrected(dataset, correction).motion)
-
-
-def _on_fitted(dataset: Dataset, simulation: OwnSimulation | None, found: Analysis, seed: int) -> Calibrated:
+def _on_fitted(
+    dataset: Dataset, simulation: OwnSimulation | None, judged: Judged | None, found: Analysis, seed: int
+) -> Calibrated:
     """Errors before and after the ship's own coefficients are calibrated, on the runs that were fitted."""
-    if simulation is not None:
-        return simulation_on_fitted_runs(dataset, simulation, seed)
+    if simulation is not None and judged is not None:
+        return judged.calibrated(dataset, simulation, seed)
     return on_fitted_runs(dataset, found.selection.null, seed)
 
 

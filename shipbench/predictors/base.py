@@ -262,6 +262,12 @@ def make_predictor(model: Any, device: str | None = None) -> Any:
     return model
 
 
+def learns(spec: Spec, model: Any) -> bool:
+    """Whether the fit of the model of a spec learns from the runs: not where it comes fitted, or says that it does
+    not."""
+    return not spec.saved and getattr(model, "learns", True) is not False
+
+
 def _given(spec: Spec) -> Any:
     """New object of a class in memory, or a copy of an object."""
     try:

@@ -93,6 +93,7 @@ class Predictions:
     replay: ClassVar[bool] = True
     earth_fixed: ClassVar[bool] = True
     seeded: ClassVar[bool] = False
+    learns: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         self.path: Path | None = None

@@ -15,6 +15,7 @@ from made_fmu import STATES, TEN, TRUE, description, members, sail_fmu, write_ar
 
 from shipbench.api import benchmark
 from shipbench.bench.submissions import read_results
+from shipbench.bench.twins import simulate_like
 from shipbench.contract.check import check_model
 from shipbench.errors import InputError, WorkError
 from shipbench.exporting.formats import export
@@ -161,6 +162,11 @@ def test_a_saved_model_predicts_the_same_and_only_with_its_own_fmu(fmu, trial, t
     meta.write_text(meta.read_text().replace(str(path), "ship.fmu"))
     with pytest.raises(InputError, match=r"damaged|without its folder"):
         make_predictor(str(tmp_path / "saved"))
+
+
+def test_a_twin_is_not_made_by_an_fmu_that_is_calibrated_to_the_trial(ship_fmu, trial):
+    with pytest.raises(InputError, match="must be fitted before it can simulate"):
+        simulate_like(f"{ship_fmu()}[fit=[Xuu],workers=1]", trial)
 
 
 @pytest.mark.long

@@ -52,7 +52,6 @@ def of(found: list[Finding], kind: str) -> Finding:
     return matching[0]
 
 
-@pytest.mark.long
 def test_revolutions_are_per_second(found):
     assert of(found, "unit").line == '[units]\nn = "rev/s"'
 

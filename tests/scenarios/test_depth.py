@@ -62,7 +62,6 @@ def test_what_a_recorded_depth_does_is_in_the_model(trials):
     assert "1.4 to 6.7 draughts" in warning
 
 
-@pytest.mark.long
 def test_deep_water_changes_nothing(trials):
     deep = sounded(unsounded(trials), 1.1 * DEEP * trials.ship.T)
     assert Plant.of(deep).seg.depth is None

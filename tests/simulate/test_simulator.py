@@ -17,7 +17,6 @@ def rows():
     return {(r["ship"], r["quantity"]): r for r in table()}
 
 
-@pytest.mark.long
 def test_kvlcc2_turns_as_published(rows):
     assert rows["kvlcc2_l7", "advance, +35 deg"]["computed"] == pytest.approx(3.31, rel=0.03)
     assert rows["kvlcc2_l7", "tactical diameter, +35 deg"]["computed"] == pytest.approx(3.36, rel=0.03)

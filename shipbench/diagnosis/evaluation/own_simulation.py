@@ -15,10 +15,9 @@ from ...errors import InputError, ShipbenchError
 from ...estimation.beside import PUSHES, BesideSimulation
 from ...estimation.forward import Segments, cut
 from ...estimation.resampling import averaged
-from ...predictors.base import make_predictor
+from ...predictors.base import learns, make_predictor
 from ...predictors.context import Context, predicted
-from ...predictors.own_simulator import Simulator
-from ...predictors.physics_model.correction import Correction, beside_simulation
+from ...predictors.physics_model.correction import Correction, beside_simulation, correctable
 from ...records import Dataset
 from ...registry import reason
 from ...signals import MOTION
@@ -58,7 +57,7 @@ class OwnSimulation:
 
     def of_training(self, dataset: Dataset, train: Dataset) -> tuple[OwnSimulation, Dataset]:
         """Simulation and `train` as they are where only the runs of `train` are known; `dataset` has all of them."""
-        if self.spec.saved or isinstance(self.model, Simulator):
+        if not learns(self.spec, self.model):
             return self, train
         other = OwnSimulation(self.spec, without_pushes(train))
         return other, other.beside(train)
@@ -162,7 +161,23 @@ def simulation_fold_errors(
     return FoldErrors(test, alone, own, after, alone, own)
 
 
-def simulation_on_fitted_runs(dataset: Dataset, simulation: OwnSimulation, seed: int) -> Calibrated:
-    """Errors of the simulation, alone and with the ship's own coefficients, on the runs that were fitted."""
-    alone, own = simulation.alone(dataset), simulation.corrected(dataset, Correction.fit(dataset))
-    return of_runs(dataset, alone.errors, own.errors, seed, held_out=False)
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """Simulation on the runs that were fitted: its correction, with the causes, and rollouts without and with it."""
+
+    correction: Correction
+    alone: Rollouts
+    corrected: Rollouts
+
+    @classmethod
+    def of(cls, dataset: Dataset, simulation: OwnSimulation, causes: Sequence[str]) -> Judged:
+        """Correction fitted to all runs, of `beside_simulation`, with those causes that it can hold."""
+        correction = Correction.fit(dataset, correctable(causes))
+        return cls(correction, simulation.alone(dataset), simulation.corrected(dataset, correction))
+
+    def calibrated(self, dataset: Dataset, simulation: OwnSimulation, seed: int) -> Calibrated:
+        """Errors of the simulation, alone and with the ship's own coefficients."""
+        own = self.corrected
+        if self.correction.physics.extension is not None:
+            own = simulation.corrected(dataset, Correction.fit(dataset))
+        return of_runs(dataset, self.alone.errors, own.errors, seed, held_out=False)

@@ -42,7 +42,7 @@ def test_channels_of_the_simulation_can_be_taken_off_again(harbour):
 
 
 def test_a_model_that_learns_is_fitted_to_the_training_runs_alone(harbour):
-    learns = OwnSimulation(parse_spec("hold"), harbour)
+    learns = OwnSimulation(parse_spec("sklearn:Ridge"), harbour)
     train = learns.beside(harbour).subset(range(10))
     other, runs = learns.of_training(learns.beside(harbour), train)
     assert len(other.known) == 10
