@@ -58,11 +58,15 @@ def write_correction(d: Diagnosis, folder: Path) -> list[Path]:
 
 
 def _write_law(d: Diagnosis, folder: Path) -> Path:
-    """Write force_law.txt: coefficients of the physics whose difference to the ship file's corrects the simulation."""
+    """Write force_law.txt: coefficients of the physics whose difference to the nearest one corrects the simulation."""
     law = "" if d.correction is None else str(d.correction.physics.describe()).rstrip()
-    return write_text(folder / "force_law.txt", law + "\n")
+    return write_text(folder / "force_law.txt", f"{_LAW}\n\n{law}\n")
 
 
+_LAW = (
+    "Correction of the simulation: at every step the accelerations by the coefficients and causes below are added,\n"
+    "and those of the physics nearest to the simulation (correction/reference.json) are taken off."
+)
 _CORRECTED = "corrected.py"
 _MODULE = '''"""Simulation with a correction, as `shipbench diagnose` found it. Model spec: corrected.py:corrected"""
 

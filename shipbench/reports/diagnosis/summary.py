@@ -101,7 +101,8 @@ def summary_lines(d: Diagnosis, width: int = WIDTH, full: bool = True) -> list[s
     if full:
         lines += _wrong_lines(d, width) + _candidate_lines(d, width) + _detectable_lines(d, width)
     if command := next_command(d):
-        lines += [*paragraph(f"Model to compare: {d.extended_model}", width), *command_lines(command, width)]
+        known = " (fitted to these runs)" if d.simulation else ""
+        lines += [*paragraph(f"Model to compare: {d.extended_model}{known}", width), *command_lines(command, width)]
     if not full:
         lines += ["", "All tables (errors by channel, candidates, detection limits): --full"]
     return lines

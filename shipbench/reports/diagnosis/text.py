@@ -172,6 +172,8 @@ def headline(d: Diagnosis) -> str:
         found = f"{', '.join(first)}, and {last}" if first else last
         if not added(d):
             return f"Found: only {found}."
+        if d.simulation and d.gain is not None:  # its errors stand beside each other in `calibration_words`
+            return f"Found: {found}."
         return f"Found: {found}. {gain_words(d.gain, *added(d), whole=baseline(d))}"
     if d.verdict == "unknown" and d.unknown:
         return (

@@ -17,6 +17,7 @@ from shipbench.cli.app import app
 from shipbench.diagnosis.result import Calibrated, Candidate, Diagnosis, Estimate, Gain, Moved, NoiseFloor
 from shipbench.reports.diagnosis.files import write_diagnosis, write_report
 from shipbench.reports.diagnosis.linked import changed, chosen_segments, fits, position_errors
+from shipbench.reports.diagnosis.page import diagnosis_page
 from shipbench.reports.diagnosis.page import diagnosis_page as page
 from shipbench.reports.diagnosis.summary import summary_lines
 from shipbench.reports.diagnosis.text import WIDTH, gain_words, headline
@@ -286,3 +287,15 @@ def test_nothing_named_for_want_of_data_is_not_called_nothing_found():
     d = make_diagnosis("none")
     assert "Nothing found" not in headline(d)
     assert "Nothing found" in headline(replace(d, warnings=()))
+
+
+def test_the_page_of_a_simulation_names_it_and_not_the_ship_file():
+    own = Calibrated(21.6, 14.2, (11.0, 17.0), 120.0, True)
+    made = replace(
+        make_diagnosis(), simulation="sim.py:simulate", calibration=own, extended_model="corrected.py:corrected"
+    )
+    text = diagnosis_page(made)
+    assert "Errors of your simulation" in text
+    assert "shipbench diagnose trial --model sim.py:simulate" in text
+    assert "compares it with your simulation" in text
+    assert "compares it with <code>physics</code>" not in text

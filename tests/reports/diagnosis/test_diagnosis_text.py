@@ -178,3 +178,8 @@ def test_what_the_ship_does_otherwise_than_the_simulation_is_said():
     assert "The ship's speed at 90 rpm is 9 % smaller than your simulation's" in calibration_words(
         judged(calibration=own)
     )
+
+
+def test_the_errors_of_a_simulation_are_told_once_and_the_correction_knows_the_runs():
+    assert headline(judged()) == "Found: a current of 0.31 m/s towards 143°."
+    assert "Model to compare: out/corrected.py:corrected (fitted to these runs)" in "\n".join(summary_lines(judged()))
