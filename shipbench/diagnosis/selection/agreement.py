@@ -47,7 +47,8 @@ def covariance(fit: Fit, index: int) -> np.ndarray:
 
 def is_borne_by_one(fit: Fit, index: int) -> bool:
     """Whether one run alone supports a cause against the others: there is evidence for it, and, without that run,
-    against it."""
+    against it. Runs in which it does not act (propeller walk astern, where one run alone goes astern) speak neither
+    way: what they leave is 0 but for rounding."""
     S, *_ = shared_alone(fit.reduced, fit.prior)
     inside, whole = np.isin(fit.prior.shared, fit.columns_of(index)), S.sum(axis=0)
 
@@ -59,7 +60,7 @@ def is_borne_by_one(fit: Fit, index: int) -> bool:
         return np.asarray(fitted - np.linalg.slogdet(A)[1] + np.sum(np.log(precision)))
 
     with_all, *left = evidence(np.ones_like(inside)) - evidence(~inside)
-    return bool(with_all > 0.0 and len(left) > 1 and min(left) < 0.0)
+    return bool(with_all > 0.0 and len(left) > 1 and min(left) < -THRESHOLDS.value("tie"))
 
 
 def lasts(fit: Fit) -> bool:
