@@ -6,6 +6,7 @@ It is the spec `sim.py:simulate`, or an object in memory. A class with a method 
 from __future__ import annotations
 
 import inspect
+import logging
 from collections.abc import Callable, Mapping
 from typing import Any, Self
 
@@ -18,7 +19,10 @@ from ..registry import reason
 from ..signals import COMMANDS, STATES
 from .context import Context, wants_context
 
+_log = logging.getLogger(__name__)
 _CALL = "simulate(s0, U, dt)"
+_ROUNDING = 1e-4
+"""Difference of two answers to the same question, of the size of the signal, that rounding may make."""
 
 
 class Simulator:
@@ -28,7 +32,7 @@ class Simulator:
     inputs) and S (K, 10).
 
     A function with an argument `context` is given the `Context` of the runs. `settings` are further arguments of the
-    function, by name.
+    function, by name. A run on which the function raises has no states (NaN); the others go on.
 
     Raises:
         InputError: the function cannot be called with (s0, U, dt), or has no argument of a setting's name.
@@ -64,7 +68,7 @@ class Simulator:
         """States S (batch, K, 10) that the function returns for s0 (batch, 10) and U (batch, K, inputs).
 
         Raises:
-            ValueError: it returns another shape, for a batch and for a run alone.
+            ValueError: it raises on every run, returns another shape, or other states for the same run asked twice.
         """
         s0, U = np.asarray(s0, dtype=float), np.asarray(U, dtype=float)
         if s0.ndim == 1:
@@ -78,9 +82,8 @@ class Simulator:
                 "`shipbench run`."
             )
         if self._single is None:
-            self._single, S = self._found_out(s0, U, context)
-            return S
-        return self._by_run(s0, U, context) if self._single else self._whole(s0, U, context)
+            return self._found_out(s0, U, context)
+        return self._answers(s0, U, context)
 
     def describe(self) -> str:
         """First line of the function's docstring, and its settings."""
@@ -90,22 +93,83 @@ class Simulator:
     def _set(self) -> list[str]:
         return [f"{key} = {value}" for key, value in self.settings.items()]
 
-    def _found_out(self, s0: np.ndarray, U: np.ndarray, context: Context | None) -> tuple[bool, np.ndarray]:
-        """Whether the function takes one run at a time, and its answer. A batch is tried first."""
-        faults = []
-        for single, ask in ((False, self._whole), (True, self._by_run)):
+    def _found_out(self, s0: np.ndarray, U: np.ndarray, context: Context | None) -> np.ndarray:
+        """States of all runs, and from now on whether the function takes one run at a time.
+
+        One run is asked twice, so that what the function keeps from call to call shows, and then as a batch of one. A
+        function that takes both is asked for batches, which are faster.
+        """
+        faults: dict[str, str] = {}
+        for self._single, form in ((True, "one run"), (False, "a batch")):
+            for i in range(len(s0)):
+                try:
+                    first, again = (self._row(i, s0, U, context) for _ in range(2))
+                except Exception as error:  # a stranger's function may raise anything
+                    faults.setdefault(form, reason(error).rstrip("."))
+                    continue
+                self._check_repeated(first, again)
+                self._single = self._single and not self._takes_batches(first, i, s0, U, context)
+                return self._answers(s0, U, context)
+        self._single = None
+        told = list(dict.fromkeys(faults.values()))
+        why = f"{told[0]}." if len(told) == 1 else " ".join(f"On {form}: {text}." for form, text in faults.items())
+        raise ValueError(f"{_CALL} of {self.name} fails. {why} Accepted: S (K, 10) of one run, or (batch, K, 10)")
+
+    def _check_repeated(self, first: np.ndarray, again: np.ndarray) -> None:
+        if (apart := _apart(first, again)) is not None:
+            k, column = apart
+            self._single = None
+            raise ValueError(
+                f"{_CALL} of {self.name} returns other states when the same run is asked again: {STATES[column]} is "
+                f"{again[k, column]:.6g} in place of {first[k, column]:.6g} at time step {k + 1}. Accepted: the same "
+                "answer to the same question. Begin each call anew from s0, and draw random numbers from a seed in the "
+                "function"
+            )
+
+    def _takes_batches(self, first: np.ndarray, i: int, s0: np.ndarray, U: np.ndarray, context: Context | None) -> bool:
+        """Whether a function of one run gives the same states `first` (K, 10) of run `i` for a batch of it alone."""
+        rows = None if context is None else context.rows([i])
+        try:
+            return _apart(first, self._asked(s0[i : i + 1], U[i : i + 1], rows)[0]) is None
+        except Exception:  # a stranger's function may raise anything; it takes one run
+            return False
+
+    def _answers(self, s0: np.ndarray, U: np.ndarray, context: Context | None) -> np.ndarray:
+        """States of all runs; NaN where the function raises.
+
+        Raises:
+            Exception: that of the first run, where it raises on every run.
+        """
+        if not self._single:
             try:
-                return single, ask(s0, U, context)
+                return self._asked(s0, U, context)
+            except Exception as error:  # one run may be enough to fail them all: each gets its chance alone
+                if len(s0) == 1:
+                    raise
+                _log.debug("the batch fails: %s", reason(error))
+        S, faults = np.full((*U.shape[:-1], len(STATES)), np.nan), dict[int, Exception]()
+        for i in range(len(s0)):
+            try:
+                S[i] = self._row(i, s0, U, context)
             except Exception as error:  # a stranger's function may raise anything
-                faults.append(reason(error))
-        raise ValueError(f"{_CALL} of {self.name} fails on a batch ({faults[0]}) and on one run ({faults[1]})")
+                faults[i] = error
+        if len(faults) == len(s0):
+            raise faults[0]
+        if faults:
+            i, fault = next(iter(faults.items()))
+            run = context.runs[i] if context is not None else f"row {i}"
+            _log.warning(
+                "warning: %s fails in %d of %d runs, which have no states: %s: %s",
+                self.name, len(faults), len(s0), run, reason(fault),
+            )  # fmt: skip
+        return S
 
-    def _whole(self, s0: np.ndarray, U: np.ndarray, context: Context | None) -> np.ndarray:
-        return self._asked(s0, U, context)
-
-    def _by_run(self, s0: np.ndarray, U: np.ndarray, context: Context | None) -> np.ndarray:
-        rows = [None if context is None else context.rows([i]) for i in range(len(s0))]
-        return np.stack([self._asked(*one) for one in zip(s0, U, rows, strict=True)])
+    def _row(self, i: int, s0: np.ndarray, U: np.ndarray, context: Context | None) -> np.ndarray:
+        """States (K, 10) of a run, asked alone."""
+        rows = None if context is None else context.rows([i])
+        if self._single:
+            return self._asked(s0[i], U[i], rows)
+        return self._asked(s0[i : i + 1], U[i : i + 1], rows)[0]
 
     def _asked(self, s0: np.ndarray, U: np.ndarray, context: Context | None) -> np.ndarray:
         more = self.settings | ({"context": context} if wants_context(self.function) else {})
@@ -114,6 +178,18 @@ class Simulator:
         if S.shape != expected:
             raise ValueError(f"{_CALL} returned the shape {S.shape} for U {U.shape}; accepted: {expected}, without s0")
         return S
+
+
+def _apart(first: np.ndarray, again: np.ndarray) -> tuple[int, int] | None:
+    """First step and column where two answers (K, 10) to one question differ by more than rounding, or None."""
+    size = np.max(np.where(np.isfinite(first), np.abs(first), 0.0), axis=0)
+    with np.errstate(invalid="ignore"):
+        other = np.abs(first - again) > _ROUNDING * size + 1e-9
+    other |= np.isfinite(first) != np.isfinite(again)
+    if not other.any():
+        return None
+    k, column = np.argwhere(other)[0]
+    return int(k), int(column)
 
 
 def _check_arguments(name: str, function: Callable[..., Any], settings: Mapping[str, Any]) -> None:

@@ -116,3 +116,88 @@ def test_the_context_holds_run_and_time_of_each_window(harbour):
 
 def len_of(s0, U, dt):
     return U
+
+
+def keeping(kept: list[float], anew: bool):
+    """Function of one run that keeps its rudder angle in `kept` from call to call, or begins anew."""
+
+    def simulate(s0, U, dt):
+        if anew:
+            kept[0] = float(s0[7])
+        elif not kept:
+            kept.append(s0[7])
+        x, y, psi, u, v, r = s0[:6]
+        states = []
+        for n, delta in U[:, :2]:
+            kept[0] += 0.1 * (delta - kept[0])
+            r += dt * 1e-3 * kept[0]
+            psi += dt * r
+            states.append([x, y, psi, u, v, r, n, kept[0], 0.0, 0.0])
+        return np.array(states)
+
+    return simulate
+
+
+@pytest.mark.parametrize("kept", [[], [0.0]])
+@pytest.mark.parametrize("runs", [1, 6, 9])
+def test_a_function_that_keeps_its_state_between_calls_is_refused_and_one_that_begins_anew_is_not(harbour, runs, kept):
+    batch = harbour.subset(range(runs)).batch()
+    batch.U[:, :, 1] = 0.3
+    with pytest.raises(ValueError, match=r"same run is asked again: .* Begin each call anew from s0"):
+        Simulator(keeping([*kept], False)).fit(harbour).predict(batch.s0, batch.U)
+    S = Simulator(keeping([0.0], True)).fit(harbour).predict(batch.s0, batch.U)
+    assert np.isfinite(S).all()
+
+
+def test_a_function_that_draws_is_refused(harbour):
+    batch = harbour.batch()
+    draws = np.random.default_rng(0)
+    with pytest.raises(ValueError, match="draw random numbers from a seed"):
+        Simulator(lambda s0, U, dt: np.repeat(s0[:, None], U.shape[1], 1) + draws.normal(size=10)).fit(harbour).predict(
+            batch.s0, batch.U
+        )
+
+
+@pytest.mark.parametrize("single", [True, False])
+def test_a_run_on_which_it_raises_has_no_states_and_the_others_do(harbour, caplog, single):
+    batch = harbour.batch()
+    bad = batch.s0[0, 0]
+
+    def one(s0, U, dt):
+        if s0[0] == bad:
+            raise RuntimeError("no solution")
+        return np.repeat(np.array(s0[:10].tolist())[None], len(U), axis=0)
+
+    def whole(s0, U, dt):
+        return np.stack([one(s, u, dt) for s, u in zip(s0, U, strict=True)])
+
+    S = Simulator(one if single else whole).fit(harbour).predict(batch.s0, batch.U, context=Context.of(harbour))
+    assert np.isnan(S[0]).all()
+    assert np.isfinite(S[1:]).all()
+    assert f"fails in 1 of {len(S)} runs, which have no states: {harbour.runs[0].id}: RuntimeError" in caplog.text
+
+
+def test_a_function_that_raises_on_every_run_is_refused_with_its_message(harbour):
+    batch = harbour.batch()
+
+    def never(s0, U, dt):
+        raise RuntimeError("no solution")
+
+    with pytest.raises(ValueError, match=r"of never fails. RuntimeError: no solution. Accepted"):
+        Simulator(never).fit(harbour).predict(batch.s0, batch.U)
+
+
+@pytest.mark.parametrize(("axis", "calls"), [(-1, 4), (0, 9)])
+def test_a_function_that_takes_both_is_asked_for_batches(harbour, axis, calls):
+    batch = harbour.subset(range(6)).batch()
+    asked = []
+
+    def simulate(s0, U, dt):
+        asked.append(s0.shape)
+        s0[..., 0] += s0[3] if axis == 0 else s0[..., 3]  # s0[3] is a speed for one run alone
+        return np.repeat(s0[..., None, :], U.shape[-2], axis=-2)
+
+    model = Simulator(simulate).fit(harbour)
+    S = model.predict(batch.s0, batch.U)
+    np.testing.assert_allclose(S[:, 0, 0], batch.s0[:, 0] + batch.s0[:, 3])
+    assert len(asked) == calls
