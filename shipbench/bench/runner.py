@@ -19,6 +19,7 @@ from ..names import brief
 from ..predictors._saved import check_origin
 from ..records import Dataset
 from ..replay.bind import bound
+from ..replay.frame import prediction_notes
 from ..specs import Spec, parse_spec
 from ..steps import listening
 from ..storage import Frame, write_json
@@ -61,11 +62,11 @@ class Outcome:
 
     @property
     def equations(self) -> dict[tuple[str, str], Path]:
-        """First file of fitted equations by data set and model of this study."""
+        """First file of fitted equations by data set and model of this study, of models that learn from the runs."""
         found: dict[tuple[str, str], Path] = {}
         for s in self.summaries:
             path = self.out / Cell(s["dataset"], s["model"], s["fold"], s["seed"]).folder / "equations.txt"
-            if path.is_file():
+            if path.is_file() and s.get("learns", True):
                 found.setdefault((s["dataset"], s["model"]), path)
         return found
 
@@ -261,6 +262,7 @@ class _Record:
 def _score(study: Study, spec: Spec, cell: Cell, answer: Answer) -> _Record:
     """Rows of the fold, one per scored window, from the prediction of the model or the reason why there is none."""
     batch, data, task, S = study.batches[cell.fold], study.data, study.task, answer.S
+    notes = dict(answer.notes)
     status, reason = answer.status, answer.reason
     if S is None:
         statuses, reasons = [status] * len(batch.ids), [reason] * len(batch.ids)
@@ -278,9 +280,11 @@ def _score(study: Study, spec: Spec, cell: Cell, answer: Answer) -> _Record:
         status = whole_status(statuses)
         first = next((i for i, s in enumerate(statuses) if s == status != "ok"), None)
         reason = "" if first is None else f"run {batch.ids[first]}: {reasons[first]}"
+        if notes.get("learns") is False and "replay_report" not in notes:
+            notes["frame_notes"] = prediction_notes(S, study.folds[cell.fold].test.runs, data.ship, data.dt)
     times = {"fit_s": answer.fit_s, "fit_shared_by": answer.shared_by, "predict_s": answer.predict_s}
     rows = _rows(study, cell, statuses, reasons, values, times)
-    outcome = {"status": status, "reason": reason, "run_status": statuses, "machine": answer.machine, **answer.notes}
+    outcome = {"status": status, "reason": reason, "run_status": statuses, "machine": answer.machine, **notes}
     return _Record(rows, _summary(study, spec, cell, answer, times) | outcome)
 
 

@@ -96,8 +96,8 @@ class Answer:
         params: the model's settings, or None if it does not state them.
         parameters: count of the fitted numbers (see `cost`), or None if it is unknown.
         files: saved model and fitted equations, content by relative name.
-        notes: reason why the model could not be saved or described, and its error on its own training runs
-            (`fit_report`).
+        notes: reason why the model could not be saved or described, its error on its own training runs
+            (`fit_report`), and whether it learns nothing from them.
         machine: where it was computed.
         code: digests by relative name of the user's code that was loaded in the end, and of the files that the model
             read; empty for other models.
@@ -276,6 +276,8 @@ def _predicted(fit: _Fit, fold: FoldData) -> Answer:
         notes["fit_report"] = report.as_dict()
     elif isinstance(report, ReplayReport):
         notes["replay_report"] = report.as_dict()
+    if getattr(fit.model, "learns", True) is False:
+        notes["learns"] = False
     return Answer(
         "", "", S, fit.seconds, fit.shared_by, predict_s, params, count_parameters(fit.model), files, notes,
         skipped=skipped,

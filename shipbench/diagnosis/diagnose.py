@@ -79,7 +79,15 @@ def diagnose(
         raise InputError(f"workers: {workers}; accepted: whole numbers from 1.")
     with limited(budget or Budget()) as used:
         steps = THOROUGH_STEPS if thorough else MOST_STEPS
-        return _diagnosed(dataset, gain, seed, only, workers, steps, used, simulation)
+        try:
+            return _diagnosed(dataset, gain, seed, only, workers, steps, used, simulation)
+        except np.linalg.LinAlgError as error:
+            if simulation is None:
+                raise
+            raise InputError(
+                f"the accelerations of the simulation '{simulation.text}' are too far from those of a ship to be "
+                f"diagnosed ({error}). Score it first: shipbench run --model {simulation.text} --model hold"
+            ) from error
 
 
 def _diagnosed(

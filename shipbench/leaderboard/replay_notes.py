@@ -12,7 +12,7 @@ from ..predictors.predictions import ReplayReport, size_text
 
 def replay_notes(summaries: Iterable[Mapping[str, Any]]) -> dict[tuple[str, str], list[str]]:
     """Notes by data set and model on trajectories that were read from files: their starts against the measured ones,
-    the windows that they cover, and how they were read and matched."""
+    the windows that they cover, and how they were read and matched; and on the frame and units of a simulation."""
     found: dict[tuple[str, str], list[Mapping[str, Any]]] = {}
     for summary in summaries:
         found.setdefault((str(summary["dataset"]), str(summary["model"])), []).append(summary)
@@ -23,7 +23,8 @@ def _notes(cells: Iterable[Mapping[str, Any]]) -> list[str]:
     cells = list(cells)
     reports = [report for cell in cells if (report := _report(cell)) is not None]
     if not reports:
-        return []
+        frames = [cell["frame_notes"] for cell in cells if isinstance(cell.get("frame_notes"), list)]
+        return [str(note) for note in next((notes for notes in frames if notes), [])]
     starts, read = [_starts(reports)], dict.fromkeys(note for report in reports for note in report.notes)
     statuses = [status for cell in cells for status in cell["run_status"]]
     skipped = statuses.count("skipped")

@@ -25,7 +25,7 @@ NOT_COVERED = "no predicted trajectory covers it"
 
 def size_text(value: float, unit: str) -> str:
     """Size with its unit; below a thousandth it is the rounding of a file."""
-    return f"{value if value >= 1e-3 else 0.0:.3g} {unit}"
+    return f"{value:.0f} {unit}" if value >= 100.0 else f"{value if value >= 1e-3 else 0.0:.3g} {unit}"
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,7 +13,7 @@ from ..effects.unit_or_sign_error import FACTORS
 from ..predictors.predictions import Trajectory, size_text
 from ..records import Run
 from ..ship import Ship
-from ..signals import PSI, STATES, R, U, V, wrap_angle
+from ..signals import DELTA, PSI, STATES, N, R, U, V, wrap_angle
 from .thresholds import THRESHOLDS
 
 Pair = tuple[Trajectory, Run]
@@ -60,8 +60,16 @@ _FRAMES = (
 """Frames that programs use, beside ours."""
 
 
-def frame_notes(pairs: Sequence[Pair], ship: Ship, dt: float) -> list[str]:
-    """Notes on starts far from the measured ones: the size, the probable cause, and the line that corrects it."""
+def prediction_notes(S: np.ndarray, runs: Sequence[Run], ship: Ship, dt: float) -> list[str]:
+    """Notes as of `frame_notes` on states S (runs, K, 10) that a simulation predicted for the ends of `runs`."""
+    steps = S.shape[1]
+    pairs = [(Trajectory(float(run.t[-steps]), states), run) for run, states in zip(runs, S, strict=True)]
+    return frame_notes(pairs, ship, dt, "the states that the simulation returns")
+
+
+def frame_notes(pairs: Sequence[Pair], ship: Ship, dt: float, source: str = "the files") -> list[str]:
+    """Notes on starts far from the measured ones: the size, the probable cause, and the line that corrects it in
+    `source`."""
     seen = [begin for pair in pairs if (begin := _begin(pair, ship, dt)) is not None]
     if not seen:
         return []
@@ -73,7 +81,7 @@ def frame_notes(pairs: Sequence[Pair], ship: Ship, dt: float) -> list[str]:
     frame = _explaining(seen, ship)
     if np.median(turned) > other_heading or (frame is not None and np.median(place) > far):
         cause = (
-            f"Probable cause: {frame.name}; correct the files by {frame.line}."
+            f"Probable cause: {frame.name}; correct {source} by {frame.line}."
             if frame is not None
             else "No usual frame explains it; check psi, x and y: rad clockwise from north, m north, m east."
         )
@@ -82,8 +90,8 @@ def frame_notes(pairs: Sequence[Pair], ship: Ship, dt: float) -> list[str]:
             f"{len(seen)} trajectories), positions by {size_text(float(np.median(place)), 'm')}. {cause}"
         )
     elif np.median(place) > far:
-        notes.append(_origin_note(seen, place, ship))
-    return notes + ([] if frame is not None else _unit_notes(pairs))
+        notes.append(_origin_note(seen, place, ship, source))
+    return notes + ([] if frame is not None else _unit_notes(pairs, source))
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,25 +137,26 @@ def _explaining(seen: Sequence[_Begin], ship: Ship) -> _Frame | None:
     return _FRAMES[best] if explained and plain > math.radians(THRESHOLDS.value("other_heading")) / 2.0 else None
 
 
-def _origin_note(seen: Sequence[_Begin], place: np.ndarray, ship: Ship) -> str:
+def _origin_note(seen: Sequence[_Begin], place: np.ndarray, ship: Ship, source: str) -> str:
     apart = np.array([b.xy[0] - b.true_xy[0] for b in seen])
     middle = np.median(apart, axis=0)
     size = f"positions at the start differ by {float(np.median(place)):.4g} m (median over {len(seen)} trajectories)."
     if np.median(np.hypot(*(apart - middle).T)) <= THRESHOLDS.value("explained") * np.median(place):
         north, east = -middle
-        return f"{size} Probable cause: another origin; correct the files by x = x {north:+.4g}, y = y {east:+.4g}."
-    if np.median([np.hypot(*b.xy[0]) for b in seen]) <= THRESHOLDS.value("start_position") * ship.L:
+        return f"{size} Probable cause: another origin; correct {source} by x = x {north:+.4g}, y = y {east:+.4g}."
+    begun = [np.hypot(*b.xy[0]) - np.hypot(*(b.xy[:2] - b.xy[0]).T).max() for b in seen]  # or one step after it
+    if np.median(begun) <= THRESHOLDS.value("start_position") * ship.L:
         return (
-            f"{size} Probable cause: each trajectory starts at x = y = 0; correct the files by adding the measured "
+            f"{size} Probable cause: each trajectory starts at x = y = 0; correct {source} by adding the measured "
             "start, x = x + x_start, y = y + y_start."
         )
     return f"{size} No common origin explains it; check x and y, and the runs that the ids name."
 
 
-def _unit_notes(pairs: Sequence[Pair]) -> list[str]:
-    """Notes on speeds in another unit or with another sign, by their values at the start."""
+def _unit_notes(pairs: Sequence[Pair], source: str) -> list[str]:
+    """Notes on speeds and actuators in another unit or with another sign, by their values at the start."""
     notes = []
-    for column in (U, V, R):
+    for column in (U, V, R, N, DELTA):
         name = STATES[column]
         values, truths = [], []
         for trajectory, run in pairs:
@@ -167,6 +176,6 @@ def _unit_notes(pairs: Sequence[Pair]) -> list[str]:
             here, there = float(np.median(np.abs(mine))), float(np.median(np.abs(true)))
             notes.append(
                 f"{name} at the start is {here:.3g} where {there:.3g} was measured (medians of the size). Probable "
-                f"cause: {best}; correct the files by {name} = {name} / {units[best]:.5g}."
+                f"cause: {best}; correct {source} by {name} = {name} / {units[best]:.5g}."
             )
     return notes

@@ -7,7 +7,8 @@ import pytest
 from made_tracks import apart, predicted, rows_of
 
 from shipbench.predictors.predictions import Trajectory
-from shipbench.replay.frame import frame_notes
+from shipbench.replay.frame import frame_notes, prediction_notes
+from shipbench.signals import STATES
 
 FAULTS = {
     "degrees": (lambda t: t.assign(psi=np.rad2deg(t["psi"])), "angles in degrees", "psi = radians(psi)"),
@@ -66,3 +67,26 @@ def test_what_no_usual_frame_explains_is_told_with_its_size(data):
         data, lambda t: t.assign(x=t["x"] + t["trajectory"].map({r.id: rng.normal(0, 900) for r in data.runs}))
     )
     assert "No common origin explains it" in moved
+
+
+def test_states_that_a_simulation_returns_are_told_apart_alike(data):
+    S = np.stack([run.states[1:] for run in data.runs])
+    assert prediction_notes(S, data.runs, data.ship, data.dt) == []
+    S[..., 2] = np.rad2deg(S[..., 2])
+    [note] = prediction_notes(S, data.runs, data.ship, data.dt)
+    assert note.endswith("angles in degrees; correct the states that the simulation returns by psi = radians(psi).")
+
+
+@pytest.mark.parametrize(("name", "factor", "said"), [("n", 1 / 60, "rev/s"), ("delta", np.rad2deg(1.0), "deg")])
+def test_actuators_in_another_unit_are_told(harbour, name, factor, said):
+    S = np.stack([run.states[1:] for run in harbour.runs])
+    S[..., STATES.index(name)] *= factor
+    [note] = prediction_notes(S, harbour.runs, harbour.ship, harbour.dt)
+    assert said in note
+
+
+def test_a_simulation_that_starts_at_zero_is_told(data):
+    S = np.stack([run.states[1:] for run in data.runs])
+    S[..., :2] -= np.stack([run.states[:1, :2] for run in data.runs])
+    [note] = prediction_notes(S, data.runs, data.ship, data.dt)
+    assert "starts at x = y = 0" in note

@@ -20,10 +20,15 @@ from ...predictors.context import Context, predicted
 from ...predictors.physics_model.correction import Correction, beside_simulation, correctable
 from ...records import Dataset
 from ...registry import reason
-from ...signals import MOTION
+from ...replay.frame import prediction_notes
+from ...signals import MOTION, STATES, R, U, V
 from ...specs import Spec
 from ..result import Calibrated
 from .held_out_gain import FoldErrors, horizon, of_runs
+
+_SPEEDS = (U, V, R)
+_ASKED = 20
+"""States of a run from which a simulation steps before it is judged."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,8 +57,50 @@ class OwnSimulation:
     def beside(self, dataset: Dataset) -> BesideSimulation:
         """Runs with what the simulation adds to the ship file's physics (`beside_simulation`)."""
         model = self.model
+        self._check(dataset)
         with _faults_of(self.spec):
             return beside_simulation(without_pushes(dataset), model)
+
+    def _check(self, dataset: Dataset) -> None:
+        """Refuse a simulation whose step from a measured state is in another frame or unit, or does not begin there.
+
+        Raises:
+            InputError: with the line that corrects it.
+        """
+        plain = without_pushes(dataset)
+        seen = [(run, k) for run in plain.runs for k in range(0, len(run) - 1, max(1, len(run) // _ASKED))]
+        if not seen:
+            return
+        s0 = np.stack([run.states[k] for run, k in seen])
+        held = np.stack([run.inputs[k : k + 1] for run, k in seen])
+        context = Context(
+            plain.ship, plain.dt, plain.inputs, tuple(run.parent for run, _ in seen),
+            np.array([run.t[k] for run, k in seen]), tuple(run.began for run, _ in seen),
+        )  # fmt: skip
+
+        def stepped(start: np.ndarray) -> np.ndarray:
+            with _faults_of(self.spec):
+                return np.asarray(predicted(self.model, start.copy(), held.copy(), None, context), dtype=float)
+
+        S = stepped(s0)
+        if S.shape != (len(s0), 1, s0.shape[1]):
+            return  # `beside_simulation` says so
+        fixed = []
+        for column in _SPEEDS:
+            other = s0.copy()
+            other[:, column] += s0[:, column].std()
+            if (other != s0).any() and np.array_equal(stepped(other)[..., column], S[..., column]):
+                fixed.append(STATES[column])
+        if fixed:
+            raise InputError(
+                f"the simulation '{self.spec.text}' does not begin at the measured {', '.join(fixed)}: it steps to the "
+                "same value from any. A diagnosis steps it from measured states. Accepted: a function that begins at "
+                "s0, an FMU with start values in [start] of its mapping, or trajectories: shipbench diagnose "
+                f"{plain.name} --predictions FILE"
+            )
+        runs = [run.slice(k, k + 2) for run, k in seen]
+        if notes := prediction_notes(S, runs, plain.ship, plain.dt):
+            raise InputError(f"the simulation '{self.spec.text}' does not step from measured states: {notes[0]}")
 
     def of_training(self, dataset: Dataset, train: Dataset) -> tuple[OwnSimulation, Dataset]:
         """Simulation and `train` as they are where only the runs of `train` are known; `dataset` has all of them."""

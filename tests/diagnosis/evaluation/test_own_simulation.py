@@ -72,3 +72,22 @@ def test_a_simulation_that_fails_is_one_message(harbour, tmp_path, fault):
     for name in ("late", "soon"):
         with pytest.raises(InputError, match=rf"the simulation '.*{name}.py:simulate' fails: "):
             OwnSimulation(parse_spec(f"{tmp_path / name}.py:simulate"), harbour).beside(harbour)
+
+
+def in_degrees(s0, U, dt):
+    return still(s0, U, dt) * np.where(np.arange(10) == 2, np.rad2deg(1.0), 1.0)
+
+
+def of_its_own_start(s0, U, dt):
+    S = still(s0, U, dt)
+    S[..., 4:6] = 0.1
+    return S
+
+
+@pytest.mark.parametrize(
+    ("simulation", "said"),
+    [(in_degrees, r"Probable cause: angles in degrees"), (of_its_own_start, r"does not begin at the measured v, r")],
+)
+def test_a_simulation_that_does_not_step_from_measured_states_is_refused(harbour, simulation, said):
+    with pytest.raises(InputError, match=said):
+        OwnSimulation(spec_of(simulation), harbour).beside(harbour)
