@@ -1,11 +1,13 @@
-"""Runs of predicted trajectories: by id, by date and time of the start, or by the measured state nearest to it."""
+"""Runs of predicted trajectories: by id, also in another spelling, by date and time of the start, or by the measured
+state nearest to it."""
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from datetime import timedelta
 from functools import cached_property
 
@@ -19,6 +21,8 @@ from ..signals import PSI, R, U, V, X, Y, wrap_angle
 from .reading import Track, Tracks, coarse
 from .thresholds import THRESHOLDS
 
+_PARTS = re.compile(r"\d+|[^\W\d_]+")
+"""Words and numbers of an id."""
 _WINDOW = re.compile(r"(?P<run>.+)@(?P<start>[-+.\de]+)s")
 """Id of a window: the run and the time of its start."""
 _SHOWN = 8
@@ -46,9 +50,13 @@ def match_tracks(found: Tracks, data: Dataset, where: str) -> tuple[list[Match],
     matches: list[Match] = []
     left: list[tuple[Track, str]] = []
     ids = {csv_text(run.id): run for run in data.runs} | {run.id: run for run in data.runs}
-    nearest = _Nearest(data)
+    nearest, spelled, numbered = _Nearest(data), _unique(data.runs, _spelling), _unique(data.runs, _numbers)
     for track in found.tracks:
         match = _by_id(track, ids, data.dt) or _by_date(track, data)
+        if match is None and (run := spelled.get(_spelling(track.id))) is not None:
+            match = _of_run(track, run, data.dt, f"{track.id} -> {run.id}, by its name in another spelling")
+        if match is None and (run := numbered.get(_numbers(track.id))) is not None:
+            match = nearest.agreeing(_of_run(track, run, data.dt, f"{track.id} -> {run.id}, by its number"))
         if match is None:
             match, why = nearest.match(track)
             if match is None:
@@ -59,7 +67,7 @@ def match_tracks(found: Tracks, data: Dataset, where: str) -> tuple[list[Match],
         raise InputError(
             f"predictions {where}: no trajectory matches a run of '{data.name}'. Ids received: "
             f"{_listed([t.id for t in found.tracks])}. Accepted: {_listed([r.id for r in data.runs])}; or a start that "
-            f"was measured. {left[0][0].id}: {left[0][1]}."
+            f"was measured. {left[0][0].id}: {left[0][1]}. Name the trajectories as the runs."
         )
     notes = _told(matches)
     if left:
@@ -90,9 +98,30 @@ def _by_id(track: Track, ids: dict[str, Run], dt: float) -> Match | None:
         run, start = ids.get(window["run"]), float(window["start"])
     if run is None:
         return None
-    begin = start if track.id not in ids else float(run.t[0])
+    return _of_run(track, run, dt, "", start if track.id not in ids else None)
+
+
+def _of_run(track: Track, run: Run, dt: float, note: str, start: float | None = None) -> Match:
+    """Match whose time counts from the beginning `start` [s], that of the run by default, or from that of the run."""
+    begin = float(run.t[0]) if start is None else start
     counted_anew = track.t[0] < begin - 0.5 * dt
-    return Match(track, run, begin if counted_anew else 0.0)
+    return Match(track, run, begin if counted_anew else 0.0, note)
+
+
+def _spelling(name: str) -> tuple[str, ...]:
+    """Words and numbers of an id, without case, separators and leading zeros: "Run 3" as "run03"."""
+    return tuple(part.lstrip("0") or "0" for part in _PARTS.findall(name.lower()))
+
+
+def _numbers(name: str) -> tuple[str, ...]:
+    """Numbers of an id: ("3",) of "Test_03"."""
+    return tuple(part for part in _spelling(name) if part.isdigit())
+
+
+def _unique(runs: Sequence[Run], part: Callable[[str], tuple[str, ...]]) -> dict[tuple[str, ...], Run]:
+    """Runs by a part of their ids that no other run has, and that is not empty."""
+    counts = Counter(part(run.id) for run in runs)
+    return {key: run for run in runs if counts[key := part(run.id)] == 1 and key}
 
 
 def _by_date(track: Track, data: Dataset) -> Match | None:
@@ -135,31 +164,49 @@ class _Nearest:
         run = int(np.searchsorted(self.first, place, side="right")) - 1
         return self.data.runs[run], place - int(self.first[run])
 
+    def agreeing(self, match: Match) -> Match | None:
+        """Match by number, where heading and speed at the start are those measured in that run; else None. The place
+        may differ: its origin may be another."""
+        run, first = match.run, match.track.states[0]
+        k = round((float(match.track.t[0]) + match.shift - float(run.t[0])) / self.data.dt)
+        if not 0 <= k < len(run) or not np.isfinite(first[PSI : R + 1]).all():
+            return None
+        here = self.first[self.data.runs.index(run)] + k
+        _, turned, faster = self.apart(first)
+        if max(turned[here], faster[here]) > 1.0:
+            return None
+        return replace(match, note=f"{match.note}; heading and speed at the start agree")
+
+    def apart(self, first: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Distance, heading and speed between a start state and every sample, each over its limit (samples,)."""
+        s, L, dt = self.states, self.data.ship.L, self.data.dt
+        speed = np.hypot(s[:, U], s[:, V])
+        distance = np.hypot(s[:, X] - first[X], s[:, Y] - first[Y])
+        faster = np.abs(speed - math.hypot(first[U], first[V]))
+        turned = np.abs(wrap_angle(s[:, PSI] - first[PSI]))
+        return (
+            distance / (speed * dt + THRESHOLDS.value("start_position") * L),
+            turned / (np.abs(s[:, R]) * dt + math.radians(THRESHOLDS.value("start_heading"))),
+            faster / (self.accelerations + THRESHOLDS.value("start_speed") * math.sqrt(L / 130.0)),
+        )
+
     def match(self, track: Track) -> tuple[Match | None, str]:
         """Match, or None and the reason."""
         first = track.states[0]
         if not np.isfinite(first[: R + 1]).all():
             return None, "its first state is not finite"
-        s, L, dt = self.states, self.data.ship.L, self.data.dt
-        speed = np.hypot(s[:, U], s[:, V])
-        distance = np.hypot(s[:, X] - first[X], s[:, Y] - first[Y])
-        turned = np.abs(wrap_angle(s[:, PSI] - first[PSI]))
-        faster = np.abs(speed - math.hypot(first[U], first[V]))
-        limits = (
-            speed * dt + THRESHOLDS.value("start_position") * L,
-            np.abs(s[:, R]) * dt + math.radians(THRESHOLDS.value("start_heading")),
-            self.accelerations + THRESHOLDS.value("start_speed") * math.sqrt(L / 130.0),
-        )
-        apart = np.max([distance / limits[0], turned / limits[1], faster / limits[2]], axis=0)
+        apart = np.max(self.apart(first), axis=0)
         best = int(np.argmin(apart))
         run, k = self.at(best)
-        told = f"{size_text(distance[best], 'm')}, {size_text(math.degrees(turned[best]), 'deg')} off"
+        far = math.hypot(run.states[k, X] - first[X], run.states[k, Y] - first[Y])
+        turned = abs(float(wrap_angle(run.states[k, PSI] - first[PSI])))
+        told = f"{size_text(far, 'm')}, {size_text(math.degrees(turned), 'deg')} off"
         if apart[best] > 1.0:
             return None, f"the nearest measured state, {run.id} at t = {run.t[k]:g} s, is {told}"
         places = np.flatnonzero(apart <= 1.0)
         runs = [self.at(int(i))[0].id for i in places]
-        near = THRESHOLDS.value("frame_time") * math.sqrt(L / 130.0)
-        if len(set(runs)) > 1 or np.abs(places - best).max() * dt > near:
+        near = THRESHOLDS.value("frame_time") * math.sqrt(self.data.ship.L / 130.0)
+        if len(set(runs)) > 1 or np.abs(places - best).max() * self.data.dt > near:
             return None, f"its start fits several places: {_listed(list(dict.fromkeys(runs)))}"
         note = f"{track.id} -> {run.id} from t = {run.t[k]:g} s, by start state: {told}"
         return Match(track, run, float(run.t[k] - track.t[0]), note), ""

@@ -149,6 +149,6 @@ def test_a_folder_that_is_a_data_set_may_lack_actuators(data, tmp_path):
 
 def test_predictions_of_other_runs_are_one_message(data, tmp_path):
     table = predicted(data)
-    other = table.assign(trajectory="sim_" + table["trajectory"], x=table["x"] + 9000.0)
+    other = table.assign(trajectory="sim_" + table["trajectory"], x=table["x"] + 9000.0, psi=table["psi"] + 2.0)
     with pytest.raises(InputError, match=r"no trajectory matches a run of 'toy'. Ids received: sim_r00"):
         study(data, written(other, tmp_path / "theirs"), tmp_path / "out")

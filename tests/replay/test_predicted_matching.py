@@ -108,3 +108,24 @@ def test_finer_samples_are_interpolated_and_coarser_ones_refused(data):
     [match], _ = matched(data, gap)
     with pytest.raises(InputError, match="gap, from t = 19 s to 22 s"):
         on_grid(match, data, "theirs")
+
+
+@pytest.mark.parametrize("name", ["R 2", "r-02", "R2"])
+def test_an_id_in_another_spelling_is_the_run_of_that_name(data, name):
+    far = track(data, "r02", name=name)
+    far.states[:, :3] += [4000.0, 0.0, 2.0]
+    [match], notes = matched(data, far)
+    assert match.run.id == "r02"
+    assert notes == [f"{name} -> r02, by its name in another spelling"]
+
+
+def test_a_number_is_the_run_of_that_number_where_heading_and_speed_agree(data):
+    far = [track(data, f"r0{i}", name=f"Test_{i}") for i in range(4)]
+    for one in far:
+        one.states[:, :2] += [4000.0, -700.0]
+    matches, notes = matched(data, *far)
+    assert [m.run.id for m in matches] == ["r00", "r01", "r02", "r03"]
+    assert notes[2] == "Test_2 -> r02, by its number; heading and speed at the start agree"
+    from_one = [Track(f"Test_{i + 1}", t.t, t.states) for i, t in enumerate(far)]
+    with pytest.raises(InputError, match="Name the trajectories as the runs"):
+        matched(data, *from_one)
