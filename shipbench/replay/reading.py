@@ -203,7 +203,8 @@ def _unknown(names: Sequence[str], missing: Sequence[str], path: Path) -> InputE
     shown = ", ".join([*names[:_SHOWN], *(["..."] if len(names) > _SHOWN else [])])
     return InputError(
         f"predictions {path}: no column {', '.join(missing)}. Found: {shown}. Accepted: the columns {_COLUMNS}; or a "
-        f"mapping: shipbench data import {path} --propose {path.parent / 'mapping.toml'}"
+        f"mapping: shipbench data import {path} --propose {path.parent / 'mapping.toml'}, then with --mapping "
+        f"{path.parent / 'mapping.toml'}"
     )
 
 

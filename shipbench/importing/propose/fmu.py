@@ -14,7 +14,7 @@ from ...regular_files import check_output
 from ...signals import STATES, UNITS
 from ...storage import write_text
 from .assign import counts_to_port
-from .heads import read_head, units_of
+from .heads import QUANTITIES, read_head, units_of
 from .text import one_line, value
 
 _START = re.compile(r"(?i)^(?:start|init|initial)[_.]?|[_.]?(?:start|init|initial|0)$")
@@ -140,7 +140,9 @@ def _entry(description: Description, channel: str, variable: Variable, why: str)
     try:
         conversion(description, variable, channel, str(description.path))
         if not variable.unit:
-            spec["unit"] = UNITS[channel]
+            ours = UNITS[channel]
+            named = read_head(variable.name).units.get(QUANTITIES[ours])
+            spec["unit"], note = (named, f"{note}, [{named}] by its name") if named else (ours, note)
     except InputError:
         spec["unit"], note = "?", f"MISSING: its unit [{variable.unit}] is not one of {channel} [{UNITS[channel]}]"
     if counts_to_port(channel, f"{variable.name} {variable.description}"):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 
 import pytest
 from made_fmu import description, write_archive
@@ -86,3 +87,11 @@ def test_the_command_explains_an_fmu_and_writes_its_draft(tmp_path, monkeypatch)
     assert document["parameter"][-1]["low"] is None
     refused = run.invoke(app, ["models", "physics", "--propose", "x.toml"])
     assert isinstance(refused.exception, InputError) or refused.exit_code == 2
+
+
+def test_a_unit_in_the_name_counts_where_the_description_has_none(drafted):
+    text = description(rename={"delta_c": "rudder_order_deg", "r": "yaw_rate_degs"})
+    _, _, draft = drafted(re.sub(r' unit="(rad|rad/s)"', "", text))
+    assert 'delta_c = { variable = "rudder_order_deg", unit = "deg" }' in draft
+    assert "[deg] by its name" in draft
+    assert 'r = { variable = "yaw_rate_degs", unit = "deg/s" }' in draft

@@ -24,11 +24,12 @@ HEADS = {
     "lon": "lon|Länge|Laenge|longitud|lengdegrad",
     "x": "x_position_mid [m]|Northing|Hochwert [m]|norte (m)",
     "y": "east|Rechtswert [m]|este|øst [m]|Easting",
-    "u": "u_velo [m/s]|surge|Längsgeschwindigkeit [kn]|vitesse longitudinale|velocidad de avance|jaghastighet|u_m_s",
+    "u": "u_velo [m/s]|surge|Längsgeschwindigkeit [kn]|vitesse longitudinale|velocidad de avance|jaghastighet|u_m_s"
+    "|Surge_ms",
     "v": "vm_velo [m/s]|sway velocity|Quergeschwindigkeit|vitesse latérale|velocidad lateral|svaihastighet",
     "r": (
         "ROT [deg/min]|rate of turn|Drehrate [°/min]|taux de giration (°/min)|velocidad de giro|svinghastighet "
-        "[°/min]|wz|r_angvelo [rad/s]"
+        "[°/min]|wz|r_angvelo [rad/s]|YawRate_degs|yaw_rate_rads"
     ),
     "n": "shaft speed [rpm]|Drehzahl [1/min]|Wellendrehzahl [U/min]|régime [tr/min]|"
     "revoluciones|turtall [o/min]|n_prop [rps]|propulsion.port.revolutions",
