@@ -64,6 +64,7 @@ ELSEWHERE = {
 THROUGH = {
     "estimation/gears": "estimation/test_extension.py",
     "estimation/intervals": "estimation/test_extension.py",
+    "diagnosis/selection/form_columns": "diagnosis/selection/test_unknown.py",
     "bench/answering": "bench/test_isolate.py",
     "bench/entry": "bench/test_isolate.py",
     "bench/lock": "bench/test_study_folder.py",

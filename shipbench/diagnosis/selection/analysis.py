@@ -20,6 +20,7 @@ from ..actuators.kinds import GearFinding
 from ..actuators.record_error import RecordError
 from ..preparation.actuator_readings import judged
 from ..thresholds import THRESHOLDS
+from .form_error import beside_form
 from .requirements import Standard
 from .stepwise import Selection, candidates_for, select
 from .unknown import NO_FORM, Dependence, Search, dependences
@@ -144,6 +145,8 @@ def analyse(
         max(THRESHOLD, float(np.quantile(draws, 1.0 - THRESHOLDS.value("error_probability")))) if only is None else 0.0
     )
     selection = select(null, np.inf if cautious else threshold)
+    if not is_spent():
+        selection = replace(selection, first=beside_form(selection.null, selection.first))
     null = selection.null
     findings, _, errors = find_in_gears(null.plant)
     gears = [] if cautious else _named_gears(findings, threshold, only)

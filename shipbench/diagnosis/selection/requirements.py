@@ -24,6 +24,7 @@ from .agreement import (
     runs_agree,
     tells_runs_apart,
 )
+from .form_error import FormError
 from .screening import Score
 
 
@@ -95,17 +96,13 @@ class Evidence(Requirement):
         return Verdict(bool(worth >= asked), f"score {worth:.1f} below {asked:.1f}")
 
     def least_size(self, seen: Score, standard: Standard) -> np.ndarray | float:
-        """Size x along amplitude i for which x^2 V_ii - log det(1 + V) is the required score; of values of single runs
-        the root mean square x, where the sum of x^2 tr(V) - log det(1 + x^2 V) is."""
+        """Size x of each amplitude that is expected to reach the required score; of values of single runs the root mean
+        square x, where the sum of x^2 tr(V) - log det(1 + x^2 V) is that score."""
         term = seen.term
         asked = standard.threshold + term.cost(standard.null.plant.seg.runs) + standard.asked_besides(term)
         if term.per_run:
             return _root_mean_square(seen.information, asked)
-        V, volume = (
-            np.maximum(np.diag(seen.information), 1e-12),
-            np.linalg.slogdet(np.eye(term.size) + seen.information)[1],
-        )
-        return np.asarray(np.sqrt((asked + volume) / V))
+        return _least_amplitudes(seen.information, asked)
 
 
 class Plausible(Requirement):
@@ -155,6 +152,21 @@ class RunsAgree(Requirement):
         return Verdict(not is_borne_by_one(fit, index), "one run alone supports it, and the others speak against it")
 
 
+class BeyondForm(Requirement):
+    """Evidence beside a form error, too: what the fitted form of a ship lacks repeats in every run, and with exact
+    sensors passes for a cause."""
+
+    def check(self, fit: Fit, index: int, standard: Standard) -> Verdict:
+        score = FormError(fit).score(index)
+        return Verdict(
+            score >= standard.threshold,
+            f"score {score:.1f} beside an ordinary error of the ship's fitted form, below {standard.threshold:g}",
+        )
+
+    def least_size(self, seen: Score, standard: Standard) -> np.ndarray | float:
+        return 0.0 if seen.beside_form is None else _least_amplitudes(seen.beside_form, standard.threshold)
+
+
 class SameShip(Requirement):
     """Coefficients of the cause do not turn an ordinary ship into an outlier."""
 
@@ -178,9 +190,10 @@ class Significant(Requirement):
         return least_size(standard.null, seen.term)
 
 
-EVIDENCE, SIGNIFICANT, SAME_SHIP = Evidence(), Significant(), SameShip()
+EVIDENCE, SIGNIFICANT, SAME_SHIP, BEYOND_FORM = Evidence(), Significant(), SameShip(), BeyondForm()
 REQUIREMENTS: tuple[Requirement, ...] = (
-    EVIDENCE, Plausible(), OrdinaryShip(), NoImitation(), ConstantWithinRuns(), RunsAgree(), SAME_SHIP, SIGNIFICANT,
+    EVIDENCE, Plausible(), OrdinaryShip(), NoImitation(), ConstantWithinRuns(), RunsAgree(), BEYOND_FORM, SAME_SHIP,
+    SIGNIFICANT,
 )  # fmt: skip
 """Requirements in the order in which they are checked."""
 SURE = tuple(r for r in REQUIREMENTS if r not in (EVIDENCE, SAME_SHIP) and not r.of_size)
@@ -197,6 +210,13 @@ def detection_limit(seen: Score, standard: Standard) -> np.ndarray:
     """Detection limit of each amplitude of a candidate, in typical sizes."""
     limits = [np.broadcast_to(r.least_size(seen, standard), (seen.term.size,)) for r in REQUIREMENTS]
     return np.max(limits, axis=0)
+
+
+def _least_amplitudes(information: np.ndarray, asked: float) -> np.ndarray:
+    """Size x along amplitude i for which x^2 V_ii - log det(1 + V) is `asked`, of an `information` V (size, size)."""
+    V = np.maximum(np.diag(information), 1e-12)
+    volume = np.linalg.slogdet(np.eye(len(V)) + information)[1]
+    return np.asarray(np.sqrt((asked + volume) / V))
 
 
 def _root_mean_square(information: np.ndarray, asked: float) -> float:

@@ -26,7 +26,8 @@ class Score:
     estimate, sd (size,) in units of the typical size (for a random effect: root mean square over runs, and NaN);
     information (size, size): precision of the estimate that the data give, nuisances integrated out (for a random
     effect (N, size, size): of each run, what it has of its own integrated out); per_run (N,): gain in log likelihood by
-    run; log_tau2: of a random effect.
+    run; log_tau2: of a random effect; beside_form: information that is left beside a form error (`form_error`), where
+    it is known.
     """
 
     term: Term
@@ -36,6 +37,7 @@ class Score:
     information: np.ndarray
     per_run: np.ndarray
     log_tau2: float = 0.0
+    beside_form: np.ndarray | None = None
 
 
 def with_columns(prior: Prior, at: np.ndarray, term: Term, log_tau2: float, width: float = 1.0) -> Prior:

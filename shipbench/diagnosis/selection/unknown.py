@@ -3,25 +3,22 @@ library fits. It needs no simulation."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
 
 import numpy as np
 
 from ...estimation.budget import is_spent
-from ...estimation.columns import Bend, Columns
 from ...estimation.gauss_newton import fit
-from ...estimation.gram import Gram, Prior, beside_products, ornstein_uhlenbeck, solve
+from ...estimation.gram import Gram, Prior, solve
 from ...estimation.laplace import Fit, settled_evidence, sloped
-from ...estimation.linearisation import Linearisation
-from ...estimation.log_determinant import coefficients_at, slopes
-from ...estimation.whitening import products_of, whitened
+from ...estimation.whitening import products_of
 from ..thresholds import THRESHOLDS
-from .features import Feature, of_forces, of_sensors
+from .features import of_forces, of_sensors
+from .form_columns import AXES, Tried, Wider, added, pushed
 from .screening import evidence
 
-AXES = ("surge", "sway", "yaw")
 SENSORS = {"recorded heading": 2, "recorded surge": 3, "recorded sway": 4, "recorded yaw rate": 5}
 """Recorded quantities whose errors are searched, and their channels."""
 _NAMED = ("recorded heading", "recorded yaw rate")
@@ -64,27 +61,6 @@ class Dependence:
         return self.variable == "nothing" and self.axis in _NAMED
 
 
-@dataclass(frozen=True)
-class _Tried:
-    """Form on one axis, with its columns; ways: number of forms of which it was chosen."""
-
-    axis: str
-    variable: str
-    form: str
-    ways: int
-    columns: np.ndarray
-    bend: Bend
-
-    @property
-    def size(self) -> int:
-        return int(self.columns.shape[-1])
-
-    @property
-    def cost(self) -> float:
-        """Log evidence lost by the choice of the form."""
-        return float(np.log(self.ways))
-
-
 def dependences(fit: Fit, beside: Collection[str] = ()) -> list[Dependence]:
     """Dependences that `Search` finds, best first."""
     return Search(fit, beside).found
@@ -99,11 +75,11 @@ class Search:
     """
 
     def __init__(self, fit: Fit, beside: Collection[str] = ()) -> None:
-        lin = Linearisation(fit.plant, fit.scales, fit.point, fit.motion)
-        self.fit, self.lin, self.columns = fit, lin, lin.columns()
+        self.fit, self.wider = fit, Wider.of(fit)
+        lin = self.wider.lin
         forces, errors = of_forces(lin), of_sensors(lin)
         sides = [
-            _pushed(lin, axis, {v: [f for f in forces[v] if f.odd == (axis > 0)] for v in beside})
+            pushed(lin, axis, {v: [f for f in forces[v] if f.odd == (axis > 0)] for v in beside})
             for axis in range(len(AXES))
         ]
         self.sides = [t for of_axis in sides for t in of_axis]
@@ -116,7 +92,7 @@ class Search:
         self.usual = fit.hyper.log_force
         self.before = evidence(self._gram([]).only(self.inside), self.plain, self.usual)[0]
         free = {v: of for v, of in forces.items() if v not in beside}
-        alone = [pair for axis in range(len(AXES)) for pair in self._best(_pushed(lin, axis, free))]
+        alone = [pair for axis in range(len(AXES)) for pair in self._best(pushed(lin, axis, free))]
         apart = {v: [pair for pair in alone if pair[0].variable == v] for v in NO_FORM}
         apart["nothing"] = [
             pair for pair in apart["nothing"] if pair[0].axis != "surge"
@@ -124,7 +100,7 @@ class Search:
         joined = [self._together(pairs) for pairs in apart.values()]
         often = fit.plant.seg.dt < 0.5 * THRESHOLDS.value("shortest_period") * fit.plant.froude
         channels = [(name, channel) for name, channel in SENSORS.items() if often and fit.plant.seg.seen[channel]]
-        alone += self._best([t for name, channel in channels for t in _added(lin, name, channel, errors)])
+        alone += self._best([t for name, channel in channels for t in added(lin, name, channel, errors)])
         self._parts = {d: parts for d, *parts in [*alone, *(pair for pair in joined if pair is not None)]}
         constant = {d.axis: t for d, t in alone if d.variable == "nothing" and d.axis in AXES}
         doubtful = [d for d in self._parts if d.variable in _BY_RUN and not d.of_sensor and d.score > 0.0]
@@ -144,7 +120,7 @@ class Search:
         score = 2.0 * (self._settled(parts) - usual - sum(t.cost for t in parts))
         return replace(d, score=max(score, d.score, *(self._refitted(t) for t in parts if d.of_sensor)))
 
-    def _of_runs(self, tried: Sequence[_Tried]) -> float:
+    def _of_runs(self, tried: Sequence[Tried]) -> float:
         """Twice the log Bayes factor of the forces `tried` with coefficients of its own in each run."""
         num, prior = sum(t.size for t in tried), self.plain
         at = len(self.inside) + np.arange(num)
@@ -152,7 +128,7 @@ class Search:
         gram = self._gram(tried).only(np.append(self.inside, self.first + np.arange(num)))
         return 2.0 * (evidence(gram, prior, self.usual, num)[0] - self.before)
 
-    def _refitted(self, tried: _Tried) -> float:
+    def _refitted(self, tried: Tried) -> float:
         """Score of an error without which the plain model is fitted again, where its coefficients keep prior and
         precision. At least so much: of an error of several degrees the linear estimate leaves some."""
         now, at = self.fit, self.first + np.arange(tried.size)
@@ -162,14 +138,15 @@ class Search:
         found = fit(now.plant.less(error), now.scales, now.model, now.point, now.hyper, now.log_tau2, guess=now.motion)
         return float(2.0 * (found.evidence - now.evidence - tried.cost) - mean @ mean + np.linalg.slogdet(cov)[1])
 
-    def _settled(self, tried: Sequence[_Tried]) -> float:
-        more, columns = [*self.sides, *tried], self._columns_with(tried)
+    def _settled(self, tried: Sequence[Tried]) -> float:
+        more = [*self.sides, *tried]
+        columns = self.wider.columns_with(more)
         products = products_of(self.fit.plant, self.fit.scales, self.fit.point, columns)
         return settled_evidence(
-            self.fit, sloped(self.lin, columns, products, self.fit.hyper), sum(t.size for t in more)
+            self.fit, sloped(self.wider.lin, columns, products, self.fit.hyper), sum(t.size for t in more)
         )
 
-    def _best(self, tried: Sequence[_Tried]) -> list[tuple[Dependence, _Tried]]:
+    def _best(self, tried: Sequence[Tried]) -> list[tuple[Dependence, Tried]]:
         """Best form of every variable and axis."""
         if not tried or is_spent():
             return []
@@ -201,7 +178,7 @@ class Search:
             )
         return found
 
-    def _together(self, of: Sequence[tuple[Dependence, _Tried]]) -> tuple[Dependence, *tuple[_Tried, ...]] | None:
+    def _together(self, of: Sequence[tuple[Dependence, Tried]]) -> tuple[Dependence, *tuple[Tried, ...]] | None:
         """Best forms of a variable on all axes where they have evidence, the strongest first; None where that is one
         axis alone."""
         parts = sorted((pair for pair in of if pair[0].score > 0.0), key=lambda pair: -pair[0].score)
@@ -217,69 +194,9 @@ class Search:
         prior = _with(self.plain, len(self.inside) + np.arange(len(at)))
         return evidence(gram.only(np.append(self.inside, at)), prior, self.usual)[:2]
 
-    def _gram(self, tried: Sequence[_Tried]) -> Gram:
-        """Gram of the fit with more columns, under its noise (products of single channels would take six times the
-        memory)."""
-        fit, seg, columns = self.fit, self.fit.plant.seg, self._columns_with(tried)
-        Z = whitened(fit.plant, fit.scales, fit.point, columns)
-        G, part = np.zeros((2, Z.shape[1], Z.shape[3], Z.shape[3]))
-        for z, log_noise in zip(Z, fit.hyper.log_noise, strict=True):
-            z *= np.exp(-0.5 * log_noise)
-            G += np.matmul(np.swapaxes(z, 1, 2), z, out=part)
-        nothing = np.zeros((len(G), G.shape[-1] - 6 - 3 * fit.plant.knots))
-        correlation = ornstein_uhlenbeck(fit.plant.knots, fit.plant.knot_time, fit.hyper.tau)
-        gram = Gram(G, fit.plant.knots, *correlation, nothing[:, -1], nothing, seg.run, seg.runs)
-        inverse = gram.only(np.arange(0)).reduce(fit.hyper.log_force).inverse
-        return replace(
-            gram,
-            slope=beside_products(slopes(self.lin, columns, inverse, fit.hyper), coefficients_at(self.lin, columns)),
-        )
-
-    def _columns_with(self, tried: Sequence[_Tried]) -> Columns:
-        more = [*self.sides, *tried]
-        return replace(
-            self.columns,
-            candidates=tuple(t.columns for t in more),
-            bends=(*self.columns.bends, *(t.bend for t in more)),
-        )
-
-
-def _pushed(lin: Linearisation, axis: int, of: Mapping[str, Sequence[Feature]]) -> list[_Tried]:
-    """Columns of forces on one axis."""
-    forms = [(v, f) for v, group in of.items() for f in group]
-    if not forms:
-        return []
-    sd = THRESHOLDS.value("force_prior")
-    on, aside = (sd * np.concatenate(x) for x in ([f.on for _, f in forms], [f.aside for _, f in forms]))
-    columns, bend = lin.pushed(axis, on, aside)
-    found, at = [], 0
-    for v, f in forms:
-        part = np.s_[at : at + f.size]
-        found.append(
-            _Tried(
-                AXES[axis],
-                v,
-                f.form,
-                f.ways,
-                columns[..., part],
-                Bend(None if bend.rates is None else bend.rates[part]),
-            )
-        )
-        at += f.size
-    return found
-
-
-def _added(lin: Linearisation, name: str, channel: int, of: Mapping[str, Sequence[Feature]]) -> list[_Tried]:
-    """Columns of errors in one channel of the record."""
-    found, sd = [], THRESHOLDS.value("error_prior") * lin.scales.noise[channel]
-    for v, group in of.items():
-        for f in group:
-            error = np.zeros((*lin.motion.shape, f.size))
-            error[..., channel, :] = sd * np.moveaxis(f.on, 0, -1).swapaxes(0, 1)
-            found.append(
-                _Tried(name, v, f.form, f.ways, error.reshape(len(error), -1, f.size), Bend(None, (None,) * f.size))
-            )
-    return found
+    def _gram(self, tried: Sequence[Tried]) -> Gram:
+        """Gram of the fit with the columns beside which it is judged, and more."""
+        return self.wider.gram([*self.sides, *tried])
 
 
 def _with(prior: Prior, at: np.ndarray) -> Prior:

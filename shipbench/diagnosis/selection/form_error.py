@@ -1,0 +1,119 @@
+"""Form error of a ship: forces beside those of the fitted form, the same in every run.
+
+No fitted form is quite that of a ship. What it lacks repeats in each run, so that it gathers evidence with the length
+of a record, and with exact sensors any cause may stand for it. A cause must explain more than such an error.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cached_property
+
+import numpy as np
+
+from ...estimation.gram import Gram, Prior
+from ...estimation.laplace import Fit
+from ...estimation.linearisation import Linearisation
+from ..thresholds import THRESHOLDS
+from .features import of_forces
+from .form_columns import AXES, Tried, Wider, pushed
+from .screening import Score, evidence
+
+NOT_OF_FORM = frozenset({"heading", "position", "time", "waves", "run", "measured wind", "thrusters"})
+"""Variables on which the hull, rudder and propeller of a ship do not depend."""
+
+ORDINARY = (THRESHOLDS.value("least_spread"),) * len(AXES)
+"""Standard deviations of the form error on the axes, in force scales: the least latent force, in every run the same."""
+
+
+class FormError:
+    """Fit beside a form error: random coefficients, shared by all runs, of every form of a force in the ship's own
+    variables, on each axis.
+
+    The coefficients of an axis have one variance, so that their sum has the standard deviation of the form error.
+    """
+
+    def __init__(self, fit: Fit) -> None:
+        self.fit = fit
+
+    @cached_property
+    def _wider(self) -> tuple[Gram, list[Tried]]:
+        """Gram with the columns of the form error, and these."""
+        wider = Wider.of(self.fit)
+        forms = _forms(wider.lin)
+        return wider.gram(forms), forms
+
+    def score(self, index: int) -> float:
+        """Score of the index-th cause (2 log Bayes factor, less its cost) beside an ordinary form error. Where a
+        form moves it (`Effect.form_spread`), what remains of it counts."""
+        fit, term = self.fit, self.fit.model.terms[index]
+        gain = self.evidence(ORDINARY, self._prior(index, 1.0)) - self.evidence(ORDINARY, self.without(index))
+        return 2.0 * gain - term.cost(fit.plant.seg.runs)
+
+    def evidence(self, spread: Sequence[float], prior: Prior | None = None) -> float:
+        """Log evidence beside a form error with standard deviations `spread` (3,) on the axes [force scales]."""
+        prior = prior or self.fit.prior
+        gram, forms = self._wider
+        sd = _spreads(forms, spread)
+        on = np.flatnonzero(sd)
+        base = len(self.fit.prior.shared) + len(self.fit.prior.random)
+        shared, random = np.append(prior.shared, base + on), prior.random
+        inside = np.concatenate([shared, random]).astype(int)
+        wider = Prior(
+            np.arange(len(shared)), np.append(prior.precision, sd[on] ** -2.0), len(shared) + np.arange(len(random)),
+            prior.log_tau2,
+        )  # fmt: skip
+        return evidence(gram.only(inside), wider, self.fit.hyper.log_force)[0]
+
+    def without(self, index: int) -> Prior:
+        """Prior of the model without the index-th cause, but for what the form of a hull makes of it."""
+        return self._prior(index, 0.0)
+
+    def _prior(self, index: int, size: float) -> Prior:
+        """Prior in which the index-th cause has a standard deviation of `size` typical ones, beside what the form of a
+        hull makes of it; amplitudes of which both are zero are left out."""
+        fit, prior, term, own = self.fit, self.fit.prior, self.fit.model.terms[index], self.fit.columns_of(index)
+        if term.per_run:
+            random = prior.random[~np.isin(prior.random, own)]
+            without = replace(prior, random=random, log_tau2=prior.log_tau2[~np.isin(prior.random, own)])
+            return prior if size else without
+        length = fit.plant.c.L
+        of_form = np.array(term.effect.form_spread(term.setting, length)) / fit.scales.amplitudes(term, length)
+        variance = dict(zip(own, size**2 + of_form**2, strict=True))
+        kept = np.array([variance.get(i, 1.0) > 0.0 for i in prior.shared])
+        shared, precision = prior.shared[kept], prior.precision[kept]
+        own_precision = [1.0 / variance[i] if i in variance else p for i, p in zip(shared, precision, strict=True)]
+        return replace(prior, shared=shared, precision=np.array(own_precision))
+
+
+def beside_form(null: Fit, scores: Sequence[Score]) -> list[Score]:
+    """Scores with the information on their terms, candidates of the baseline model `null`, that is left beside a form
+    error; values of single runs as they are."""
+    wider = replace(Wider.of(null), columns=null.columns)
+    forms = _forms(wider.lin)
+    S = wider.gram(forms).reduce(null.hyper.log_force).S.sum(axis=0)
+    sizes = [t.size for t in null.candidates]
+    end = len(S) - 1 - sum(t.size for t in forms)
+    first = end - sum(sizes)
+    nuisance = np.concatenate([null.prior.shared, np.arange(end, len(S) - 1)]).astype(int)
+    A = S[np.ix_(nuisance, nuisance)] + np.diag(np.append(null.prior.precision, _spreads(forms, ORDINARY) ** -2.0))
+    V = S[first:end, first:end] - S[first:end, nuisance] @ np.linalg.solve(A, S[nuisance, first:end])
+    at = dict(zip(null.candidates, np.cumsum([0, *sizes[:-1]]), strict=True))
+    return [
+        s if s.term.per_run else replace(s, beside_form=V[at[s.term] :, at[s.term] :][: s.term.size, : s.term.size])
+        for s in scores
+    ]
+
+
+def _forms(lin: Linearisation) -> list[Tried]:
+    """Columns of every form of a force in the ship's own variables, on each axis."""
+    forms = {v: of for v, of in of_forces(lin).items() if v not in NOT_OF_FORM}
+    return [t for axis in range(len(AXES)) for t in pushed(lin, axis, forms)]
+
+
+def _spreads(forms: Sequence[Tried], spread: Sequence[float]) -> np.ndarray:
+    """Standard deviations of the coefficients of `forms`, in units of their columns, which together have `spread` (3,)
+    on the axes [force scales]."""
+    axes = np.repeat([AXES.index(t.axis) for t in forms], [t.size for t in forms])
+    return np.asarray(spread)[axes] / (THRESHOLDS.value("force_prior") * np.bincount(axes)[axes] ** 0.5)
