@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, redirect_stdout
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -63,6 +64,21 @@ def say(text: str, err: bool = False) -> None:
     """Print text that may hold names and words of others: characters that a terminal would take for a command are shown
     as escapes."""
     typer.echo(shown(text, keep="\n\t"), err=err)
+
+
+@contextmanager
+def prints_aside() -> Iterator[None]:
+    """Send what a user's code prints on stdout to stderr meanwhile, also from C and from other processes."""
+    sys.stdout.flush()
+    kept = os.dup(1)
+    os.dup2(2, 1)
+    try:
+        with redirect_stdout(sys.stderr):
+            yield
+    finally:
+        sys.stdout.flush()
+        os.dup2(kept, 1)
+        os.close(kept)
 
 
 def print_json(data: Any) -> None:

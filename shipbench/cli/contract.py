@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from .common import Device, Json, print_json, say_wrapped, show_table
+from .common import Device, Json, print_json, prints_aside, say_wrapped, show_table
 
 
 def check(
@@ -37,7 +37,9 @@ def check(
     from ..data.base import load_dataset
     from ..render.table import Table, TableColumn
 
-    report = check_model(model, None if dataset is None else load_dataset(dataset), device)
+    data = None if dataset is None else load_dataset(dataset)
+    with prints_aside():
+        report = check_model(model, data, device)
     if as_json:
         print_json(report.document())
     else:
@@ -48,8 +50,10 @@ def check(
             TableColumn("what it says", "says"),
             TableColumn("evidence", "evidence"),
         ]
+        tried = [v for v in report.verdicts if v.tried]
         rows = [
-            vars(v) | {"status": shown[v.status], "says": "" if v.status == PASSED else v.says} for v in report.verdicts
+            vars(v) | {"status": shown[v.status], "says": "" if v.status == PASSED else v.says}
+            for v in sorted(tried, key=lambda v: v.status != BROKEN)
         ]
         counts = [len(report.of(status)) for status in (PASSED, BROKEN, NOT_APPLICABLE)]
         verdict = "breaks the contract" if counts[1] else "keeps the contract"
@@ -58,6 +62,8 @@ def check(
             "s.\n".format(*counts)
         )
         show_table(Table(f"{report.model} on {report.data}", columns, rows))
+        if others := [v.rule for v in report.verdicts if not v.tried]:
+            say_wrapped(f"Not tried, since a rule before them is broken: {', '.join(others)}.")
     if report.of(BROKEN):
         raise typer.Exit(1)
 

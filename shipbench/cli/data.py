@@ -19,6 +19,7 @@ from .common import (
     Json,
     Quiet,
     print_json,
+    prints_aside,
     say,
     say_wrapped,
     show_table,
@@ -178,7 +179,8 @@ def data_simulate(
     from ..data.base import load_dataset
 
     data = load_dataset(like)
-    twin = simulate_like(model, data, device)
+    with prints_aside():
+        twin = simulate_like(model, data, device)
     folder = out or Path(twin.name)
     write_twin(twin, folder)
     away = f"{mean_distance(twin, data):.3g} m from the measured positions on average"

@@ -20,6 +20,7 @@ from .common import (
     Quiet,
     predicted_models,
     print_json,
+    prints_aside,
     say,
     screen_width,
 )
@@ -77,7 +78,7 @@ def diagnose(
         raise InputError("--model and --predictions are both given; accepted: one of them, the simulation to judge.")
     asked = [*([model] if model else []), *predicted_models([predictions] if predictions else None, mapping)]
     judged = stand_in(parse_spec(asked[0]), data) if asked else None
-    with steps_shown(quiet or as_json):
+    with steps_shown(quiet or as_json), prints_aside():
         found = run(
             data, gain=gain, seed=seed, workers=workers, thorough=thorough, budget=Budget(seconds=cpu_limit),
             simulation=None if judged is None else judged.spec,

@@ -30,9 +30,11 @@ class Rule:
 
 @dataclass(frozen=True)
 class Verdict:
-    """Result of a rule: `status` is PASSED, BROKEN or NOT_APPLICABLE; `evidence` are figures or the reason."""
+    """Result of a rule: `status` is PASSED, BROKEN or NOT_APPLICABLE; `evidence` are figures or the reason. `tried` is
+    False where a rule before it is broken."""
 
     rule: str
     says: str
     status: str
     evidence: str
+    tried: bool = True

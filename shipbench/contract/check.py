@@ -68,8 +68,8 @@ def check_model(model: Any, data: Dataset | None = None, device: str | None = No
         model = make_predictor(spec, device)
     except InputError:
         raise
-    except Exception as error:  # a stranger's file is imported here
-        raise InputError(f"model '{text}' cannot be made: {reason(error)}. Mend its file.") from error
+    except (Exception, SystemExit) as error:  # a stranger's file is imported here
+        raise InputError(f"model '{text}' cannot be made: {reason(error).rstrip('.')}. Correct its file.") from error
     for method in ("fit", "predict"):
         if not callable(getattr(model, method, None)):
             raise InputError(
@@ -109,12 +109,13 @@ def _try(rule: Rule, subject: Subject, before: list[Verdict]) -> Verdict:
     """Verdict on one rule."""
     missing = [v.rule for v in before if v.status == BROKEN]
     if missing:
-        return Verdict(rule.name, rule.says, NOT_APPLICABLE, f"not tried: the rule '{missing[0]}' is broken")
+        evidence = f"not tried: the rule '{missing[0]}' is broken"
+        return Verdict(rule.name, rule.says, NOT_APPLICABLE, evidence, tried=False)
     try:
         return Verdict(rule.name, rule.says, PASSED, rule.tries(subject))
     except NotApplicable as why:
         return Verdict(rule.name, rule.says, NOT_APPLICABLE, str(why))
     except Broken as evidence:
         return Verdict(rule.name, rule.says, BROKEN, str(evidence))
-    except Exception as error:  # a stranger's model may raise anything, anywhere
+    except (Exception, SystemExit) as error:  # a stranger's model may raise anything, anywhere
         return Verdict(rule.name, rule.says, BROKEN, f"raised {reason(error)}")

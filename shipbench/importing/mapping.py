@@ -185,6 +185,10 @@ def _explained(error: ValidationError, path: str | Path, single: bool) -> InputE
         near = difflib.get_close_matches(loc[-1], accepted, n=1, cutoff=0.5)
         hint = f" Did you mean '{near[0]}'?" if near else ""
         return InputError(f"{path}: unknown key '{shown}'.{hint} Accepted there: {', '.join(accepted)}.{more}")
+    if first["type"] == "model_type":
+        keys, given = ", ".join(_accepted(loc, single)), str(first["input"])[:80]
+        such = f', such as {loc[-1]} = {{ column = "{given}" }}' if loc[-2:-1] == ["channels"] else ""
+        return InputError(f"{path}: {shown} = '{given}'; accepted: a table with {keys}{such}.{more}")
     value = "" if first["type"] == "missing" else f" (value: {str(first['input'])[:80]})"
     draft = option("shipbench data import LOG --propose mapping.toml", 'shipbench.propose_mapping(LOG, "mapping.toml")')
     return InputError(f"{path}: {shown}: {first['msg']}{value}{more}. `{draft}` writes a draft.")

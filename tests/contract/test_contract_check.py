@@ -141,6 +141,38 @@ def test_json_is_one_document_and_nothing_else(stranger):
     assert broken["evidence"].endswith("raised ValueError: give a batch")
 
 
+SPOILED = """
+import subprocess, sys
+print("loaded")
+def prints(s0, U, dt):
+    print("step")
+    subprocess.run(["echo", "solver"])
+    return s0[:, None] + 0.0 * U.sum()
+def leaves(s0, U, dt):
+    sys.exit(3)
+"""
+
+
+def test_what_a_model_prints_is_not_in_the_document(tmp_path, capfd):
+    (tmp_path / "sim.py").write_text(SPOILED)
+    with pytest.raises(SystemExit):
+        app(["check", f"{tmp_path}/sim.py:prints", "--json"])
+    out, err = capfd.readouterr()
+    assert json.loads(out)["broken"] > 0
+    assert {"loaded", "step", "solver"} <= set(err.split())
+
+
+def test_a_model_that_ends_the_process_breaks_a_rule_and_rules_behind_it_are_one_line(tmp_path):
+    (tmp_path / "sim.py").write_text(SPOILED)
+    result = shipbench("check", f"{tmp_path}/sim.py:leaves")
+    words = " ".join(result.stdout.split())
+    assert result.exit_code == 1
+    assert "raised SystemExit: 3" in words
+    assert words.index("BROKEN") < words.index("passed evidence")
+    assert "Not tried, since a rule before them is broken:" in words
+    assert "start, repeatable, predict_inputs" in words
+
+
 @pytest.mark.parametrize(
     ("spec", "says"),
     [

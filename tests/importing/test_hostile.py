@@ -237,6 +237,7 @@ def test_a_bad_log_is_one_message_and_nothing_is_written(trial_import, tmp_path,
 
 MAPPINGS = {
     "no TOML": ("name = ", "not valid TOML"),
+    "a column in place of a table": (mapping(body=channels(u='"Surge"')), 'such as u = { column = "Surge" }'),
     "unknown key": (mapping(top="delimitter = 3"), "unknown key 'delimitter'"),
     "unknown key in a table": (mapping(tables='[file]\ndelimitter = ";"'), "Did you mean 'delimiter'"),
     "unknown key of a channel": (mapping(body=channels(psi='{ column = "HDG", units = "deg" }')),

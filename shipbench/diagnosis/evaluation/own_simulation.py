@@ -27,6 +27,8 @@ from ..result import Calibrated
 from .held_out_gain import FoldErrors, horizon, of_runs
 
 _SPEEDS = (U, V, R)
+_LOST = 1e6
+"""Error [m] of a position that is not finite."""
 _ASKED = 20
 """States of a run from which a simulation steps before it is judged."""
 
@@ -178,6 +180,19 @@ class Rollouts:
         motion = np.concatenate([s0[:, None, MOTION], S[:, num - 1 :: num, MOTION]], axis=1)
         return cls(seg, motion)
 
+    def said(self) -> list[str]:
+        """Warning on rollouts in which a simulation has no finite position."""
+        lost = self.seg.mask & ~np.isfinite(self.motion[..., :2]).all(axis=2)
+        rows = lost.any(axis=1)
+        if not rows.any():
+            return []
+        first = self.seg.dt * float(np.min(np.argmax(lost[rows], axis=1)))
+        return [
+            f"your simulation has no finite position in {int(rows.sum())} of {len(rows)} open-loop rollouts, the "
+            f"earliest after {first:g} s. Its error counts as {_LOST / 1e3:g} km there, so its mean error says nothing. "
+            "Correct it."
+        ]
+
     @property
     def errors(self) -> np.ndarray:
         """Mean ED [m] of every run (N,), without the initial sample."""
@@ -186,7 +201,7 @@ class Rollouts:
             ed = np.hypot(*np.moveaxis(self.motion[..., :2] - seg.states[..., :2], -1, 0))
         scored = seg.mask.copy()
         scored[:, 0] = False
-        ed = np.where(scored, np.nan_to_num(ed, nan=1e6, posinf=1e6), 0.0)
+        ed = np.where(scored, np.nan_to_num(ed, nan=_LOST, posinf=_LOST), 0.0)
         total, count = (np.bincount(seg.run, v.sum(axis=1), seg.runs) for v in (ed, scored))
         return np.asarray(total / np.maximum(count, 1))
 

@@ -91,3 +91,15 @@ def of_its_own_start(s0, U, dt):
 def test_a_simulation_that_does_not_step_from_measured_states_is_refused(harbour, simulation, said):
     with pytest.raises(InputError, match=said):
         OwnSimulation(spec_of(simulation), harbour).beside(harbour)
+
+
+def test_rollouts_without_a_finite_position_are_told(harbour):
+    def lost(s0, U, dt):
+        S = still(s0, U, dt)
+        S[:, 15:] = np.nan
+        return S
+
+    alone = Rollouts.of(harbour, OwnSimulation(spec_of(lost), harbour), None)
+    [said] = alone.said()
+    assert said.startswith("your simulation has no finite position in 16 of 16 open-loop rollouts, the earliest after")
+    assert OwnSimulation(spec_of(still), harbour).alone(harbour).said() == []
