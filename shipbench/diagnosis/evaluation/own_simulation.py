@@ -189,8 +189,8 @@ class Rollouts:
         first = self.seg.dt * float(np.min(np.argmax(lost[rows], axis=1)))
         return [
             f"your simulation has no finite position in {int(rows.sum())} of {len(rows)} open-loop rollouts, the "
-            f"earliest after {first:g} s. Its error counts as {_LOST / 1e3:g} km there, so its mean error says nothing. "
-            "Correct it."
+            f"earliest after {first:g} s. Its error counts as {_LOST / 1e3:g} km there, so its mean error says "
+            "nothing. Correct it."
         ]
 
     @property
