@@ -24,6 +24,7 @@ from ..predictors.base import learns, make_predictor
 from ..predictors.context import Context, predicted
 from ..records import LARGEST, Dataset, Run
 from ..registry import reason
+from ..replay.frame import prediction_notes
 from ..signals import ACTUATORS, PSI, STATES, X, Y
 from ..specs import Spec, spec_of
 from .models import ModelFacts
@@ -103,6 +104,8 @@ def _rollouts(model: Any, spec: Spec, data: Dataset) -> list[np.ndarray]:
             found[i] = _checked(np.concatenate([found[i], states]), data.runs[i], spec)
             if data.actuators == "commanded":
                 found[i][:, ACTUATORS] = data.runs[i].states[:, ACTUATORS]
+        if notes := prediction_notes(S, [data.runs[i] for i in rows], data.ship, data.dt):
+            raise InputError(f"the states of {spec.text} are no twin of '{data.name}': {notes[0]}")
     return found
 
 

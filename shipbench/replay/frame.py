@@ -172,7 +172,9 @@ def _unit_notes(pairs: Sequence[Pair], source: str) -> list[str]:
         units = {"the other sign": -1.0} | FACTORS[name]
         left = {unit: float(np.sum(np.abs(mine / factor - true))) for unit, factor in units.items()}
         best = min(left, key=lambda unit: left[unit])
-        if left[best] <= THRESHOLDS.value("explained") * plain:
+        spread = float(np.sum(np.abs(true - true.mean())))
+        agrees = max(THRESHOLDS.value("explained") * size, THRESHOLDS.value("other_unit") * spread)
+        if left[best] <= min(THRESHOLDS.value("explained") * plain, agrees):
             here, there = float(np.median(np.abs(mine))), float(np.median(np.abs(true)))
             notes.append(
                 f"{name} at the start is {here:.3g} where {there:.3g} was measured (medians of the size). Probable "

@@ -38,6 +38,12 @@ def lost(s0, U, dt):
     return np.full((*U.shape[:-1], 10), np.inf)
 
 
+def in_degrees(s0, U, dt):
+    S = np.repeat(s0[..., None, :], U.shape[-2], axis=-2)
+    S[..., PSI] = np.rad2deg(S[..., PSI] + 1.0)
+    return S
+
+
 def breaks(s0, U, dt):
     raise ZeroDivisionError("no speed")
 
@@ -159,6 +165,7 @@ def test_a_saved_model_the_particulars_and_a_file_make_twins(harbour, tmp_path):
         (Seen(), InputError, "'Seen' must be fitted"),
         ("oracle", InputError, "'oracle' cannot simulate these runs: data set 'toy' was not made by this simulator"),
         (lost, WorkError, "lost diverges in run 'r00': x is inf 1 s after the start"),
+        (in_degrees, InputError, r"the states of in_degrees are no twin of 'toy': headings at the start differ"),
         (breaks, WorkError, r"breaks fails on 12 runs \(r00, r01, r02\): .*ZeroDivisionError: no speed"),
     ],
 )

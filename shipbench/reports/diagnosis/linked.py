@@ -37,10 +37,11 @@ def rollouts(trace: Trace, extended: bool) -> list[np.ndarray]:
 
 def position_errors(trace: Trace, predicted: np.ndarray) -> np.ndarray:
     """Mean position error ED of each segment (B,) [m], without the sample that is given; NaN where no position is
-    known."""
+    measured, infinite where a measured one is not predicted."""
     with np.errstate(all="ignore"):
         error = ed(true=trace.measured, pred=predicted)[:, 1:]
-    known = np.isfinite(error)
+    known = np.isfinite(trace.measured[:, 1:, :2]).all(axis=2)
+    error = np.where(np.isfinite(error), error, np.inf)
     return np.where(
         known.any(axis=1), np.where(known, error, 0.0).sum(axis=1) / np.maximum(known.sum(axis=1), 1), np.nan
     )
@@ -68,7 +69,8 @@ def chosen_segments(trace: Trace, extended: bool) -> list[int]:
     if len(order) <= RUNS:
         return order
     kept = {order[i] for i in np.linspace(0, len(order) - 1, RUNS - 1 if extended else RUNS).round().astype(int)}
-    gains = before - after
+    with np.errstate(invalid="ignore"):
+        gains = before - after
     if extended and np.isfinite(gains).any():
         kept.add(int(np.nanargmin(gains)))
     return [b for b in order if b in kept]
@@ -111,7 +113,7 @@ def _name(trace: Trace, b: int) -> str:
 
 
 def _error(value: float) -> str:
-    return f"{figure(value)} m" if np.isfinite(value) else "-"
+    return f"{figure(value)} m" if np.isfinite(value) else "lost" if np.isinf(value) else "-"
 
 
 def _fits(values: np.ndarray) -> list[str]:

@@ -117,12 +117,17 @@ def _error(d: Diagnosis) -> Tile:
     if d.trace is None:
         return Tile("Held-out position error", "not measured")
     errors = [position_errors(d.trace, p) for p in rollouts(d.trace, changed(d))]
-    means = [f"{figure(float(np.nanmean(e)))} m" for e in errors if np.isfinite(e).any()]
+    means = [_mean_error(e[~np.isnan(e)]) for e in errors if not np.isnan(e).all()]
     return Tile(
         "Held-out position error",
         "not measured",
         "on the runs of the fit: " + " to ".join(means) + (f", {' to '.join(drawn(d))}" * (len(means) > 1)),
     )
+
+
+def _mean_error(errors: np.ndarray) -> str:
+    lost = int(np.isinf(errors).sum())
+    return f"lost in {lost} of {len(errors)} predictions" if lost else f"{figure(float(errors.mean()))} m"
 
 
 def _file_or_own(d: Diagnosis) -> str:

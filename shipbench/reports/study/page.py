@@ -80,14 +80,14 @@ def _tiles(sections: Sequence[dict[str, Any]], results: Results) -> list[Tile]:
                 Tile(
                     f"Best on {section['name']}",
                     short_name(name),
-                    f"mean position error ED {mean:.3g} m over {section['horizon']:g} s",
+                    f"mean position error ED {mean:.2f} m over {section['horizon']:g} s",
                 )
             )
     bad = sum(any(status != "ok" for status in s["run_status"]) for s in results.summaries)
     models, windows = results.rows["model"].nunique(), len(results.rows[["dataset", "run"]].drop_duplicates())
     status = "the reasons are under Status" if bad else "every prediction was scored"
     return [
-        *best, Tile("Windows", str(windows), f"{models} models"),
+        *best, Tile("Windows", str(windows), f"{models} model{'s' * (models != 1)}"),
         Tile("Fits", str(len(results.summaries)), "data set, model, fold, seed"),
         Tile("Failed, diverged or skipped", str(bad), status),
     ]  # fmt: skip

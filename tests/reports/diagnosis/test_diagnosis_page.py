@@ -17,7 +17,7 @@ from shipbench.cli.app import app
 from shipbench.diagnosis.result import Calibrated, Candidate, Diagnosis, Estimate, Gain, Moved, NoiseFloor
 from shipbench.reports.diagnosis.files import write_diagnosis, write_report
 from shipbench.reports.diagnosis.linked import changed, chosen_segments, fits, position_errors
-from shipbench.reports.diagnosis.page import diagnosis_page
+from shipbench.reports.diagnosis.page import _mean_error, diagnosis_page
 from shipbench.reports.diagnosis.page import diagnosis_page as page
 from shipbench.reports.diagnosis.summary import summary_lines
 from shipbench.reports.diagnosis.text import WIDTH, gain_words, headline
@@ -224,6 +224,17 @@ def test_errors_leave_out_the_given_sample():
     off = trace.measured.copy()
     off[:, 1:, 0] += 3.0
     assert position_errors(trace, off) == pytest.approx(3.0)
+
+
+def test_a_prediction_without_a_position_has_no_mean_error_of_the_rest():
+    trace = make_trace()
+    lost = trace.measured.copy()
+    lost[0, 5:] = np.nan
+    errors = position_errors(trace, lost)
+    assert np.isinf(errors[0])
+    assert errors[1] == pytest.approx(0.0)
+    assert _mean_error(errors) == f"lost in 1 of {len(errors)} predictions"
+    assert chosen_segments(replace(trace, before=lost), False)[0] == 0
 
 
 def test_fits_leave_out_the_given_sample_and_what_is_not_measured():
