@@ -91,7 +91,7 @@ def frame_notes(pairs: Sequence[Pair], ship: Ship, dt: float, source: str = "the
         )
     elif np.median(place) > far:
         notes.append(_origin_note(seen, place, ship, source))
-    return notes + ([] if frame is not None else _unit_notes(pairs, source))
+    return notes + ([] if frame is not None else _unit_notes(pairs, ship, source))
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,7 +153,7 @@ def _origin_note(seen: Sequence[_Begin], place: np.ndarray, ship: Ship, source: 
     return f"{size} No common origin explains it; check x and y, and the runs that the ids name."
 
 
-def _unit_notes(pairs: Sequence[Pair], source: str) -> list[str]:
+def _unit_notes(pairs: Sequence[Pair], ship: Ship, source: str) -> list[str]:
     """Notes on speeds and actuators in another unit or with another sign, by their values at the start."""
     notes = []
     for column in (U, V, R, N, DELTA):
@@ -169,6 +169,8 @@ def _unit_notes(pairs: Sequence[Pair], source: str) -> list[str]:
         plain = float(np.sum(np.abs(mine - true)))
         if size == 0.0 or plain <= THRESHOLDS.value("other_unit") * size:
             continue
+        if column in (U, V) and plain <= THRESHOLDS.value("start_speed") * math.sqrt(ship.L / 130.0) * len(true):
+            continue  # noise of a small speed
         units = {"the other sign": -1.0} | FACTORS[name]
         left = {unit: float(np.sum(np.abs(mine / factor - true))) for unit, factor in units.items()}
         best = min(left, key=lambda unit: left[unit])

@@ -90,3 +90,9 @@ def test_a_simulation_that_starts_at_zero_is_told(data):
     S[..., :2] -= np.stack([run.states[:1, :2] for run in data.runs])
     [note] = prediction_notes(S, data.runs, data.ship, data.dt)
     assert "starts at x = y = 0" in note
+
+
+def test_noise_of_a_small_speed_is_no_other_unit(data):
+    S = np.stack([run.states[1:] for run in data.runs[:1]])
+    S[..., 4] = 1.94 * S[..., 4] + 0.01
+    assert prediction_notes(S, data.runs[:1], data.ship, data.dt) == []
