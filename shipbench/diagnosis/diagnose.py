@@ -167,7 +167,7 @@ def _diagnosed(
     lines += odd_for(found, [c.effect for c in causes]) if by_file and not doubts else []
     step("predict every run", 0.96, 1.0)
     of_all = None if simulation is None else Judged.of(dataset, simulation, [c.effect for c in causes])
-    lines += [] if of_all is None else of_all.alone.said()
+    lines += [] if of_all is None else of_all.alone.said(dataset.ship)
     trace = trace_of(dataset, found, None if of_all is None else (of_all.alone.motion, of_all.corrected.motion))
     unknown = (bool(doubts) and not causes) or (found.unknown is not None and not units)
     verdict = "unknown" if unknown else "found" if causes else "none"

@@ -91,7 +91,36 @@ def frame_notes(pairs: Sequence[Pair], ship: Ship, dt: float, source: str = "the
         )
     elif np.median(place) > far:
         notes.append(_origin_note(seen, place, ship, source))
-    return notes + ([] if frame is not None else _unit_notes(pairs, ship, source))
+    if frame is not None:
+        return notes
+    overlaps = [both for trajectory, run in pairs if len((both := _overlap(trajectory, run, dt))[0])]
+    turns = turns_against([(mine[:, R], true[:, R]) for mine, true in overlaps], ship, dt)
+    return [*notes, *(_unit_notes(pairs, ship, source) or turns)]
+
+
+def _overlap(trajectory: Trajectory, run: Run, dt: float) -> tuple[np.ndarray, np.ndarray]:
+    """Predicted and measured states (m, 10) at the time steps that both have."""
+    offset = round((trajectory.start - float(run.t[0])) / dt)
+    states, truth = trajectory.states[max(0, -offset) :], run.states[max(0, offset) :]
+    m = min(len(states), len(truth))
+    return states[:m], truth[:m]
+
+
+def turns_against(rates: Sequence[tuple[np.ndarray, np.ndarray]], ship: Ship, dt: float) -> list[str]:
+    """Note where simulated yaw rates change to the other side than the measured ones; both (m,) for each run."""
+    steps = max(1, round(THRESHOLDS.value("turn_time") * math.sqrt(ship.L / 130.0) / dt))
+    changes = [np.stack([r[steps:] - r[:-steps] for r in pair]) for pair in rates if len(pair[0]) > 2 * steps]
+    mine, true = np.concatenate(changes, axis=1) if changes else np.zeros((2, 0))
+    known = np.isfinite(mine) & np.isfinite(true)
+    mine, true = mine[known], true[known]
+    size = math.sqrt(float(mine @ mine) * float(true @ true))
+    if size == 0.0 or (likeness := float(mine @ true) / size) > THRESHOLDS.value("against"):
+        return []
+    return [
+        f"the simulated yaw rate changes to the other side than the measured one (correlation {likeness:.2f} of the "
+        f"changes in {steps * dt:g} s). Probable cause: the sign of the rudder, whose positive angle turns the ship to "
+        "starboard here; where the simulation counts to port, give it -delta_c."
+    ]
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,15 +135,11 @@ class _Begin:
 
 def _begin(pair: Pair, ship: Ship, dt: float) -> _Begin | None:
     """Beginning of a trajectory beside the measured one; None where they do not overlap, or it is not finite."""
-    trajectory, run = pair
-    offset = round((trajectory.start - float(run.t[0])) / dt)
-    i, k = max(0, -offset), max(0, offset)
     steps = math.ceil(THRESHOLDS.value("frame_time") * math.sqrt(ship.L / 130.0) / dt)
-    states, truth = trajectory.states[i : i + steps + 1], run.states[k : k + steps + 1]
-    m = min(len(states), len(truth))
-    if m < 1 or not np.isfinite(states[:m, : PSI + 1]).all():
+    states, truth = (part[: steps + 1] for part in _overlap(*pair, dt))
+    if not len(states) or not np.isfinite(states[:, : PSI + 1]).all():
         return None
-    return _Begin(states[:m, :PSI], states[:m, PSI], truth[:m, :PSI], truth[:m, PSI])
+    return _Begin(states[:, :PSI], states[:, PSI], truth[:, :PSI], truth[:, PSI])
 
 
 def _explaining(seen: Sequence[_Begin], ship: Ship) -> _Frame | None:

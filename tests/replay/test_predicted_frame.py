@@ -96,3 +96,12 @@ def test_noise_of_a_small_speed_is_no_other_unit(data):
     S = np.stack([run.states[1:] for run in data.runs[:1]])
     S[..., 4] = 1.94 * S[..., 4] + 0.01
     assert prediction_notes(S, data.runs[:1], data.ship, data.dt) == []
+
+
+def test_turns_to_the_other_side_are_told_and_right_ones_are_not(harbour):
+    S = np.stack([run.states[1:] for run in harbour.runs])
+    assert prediction_notes(S, harbour.runs, harbour.ship, harbour.dt) == []
+    S[..., 5] = 2.0 * S[:, :1, 5] - S[..., 5]
+    [note] = prediction_notes(S, harbour.runs, harbour.ship, harbour.dt)
+    assert "correlation -1.00 of the changes in 16 s" in note
+    assert note.endswith("give it -delta_c.")

@@ -20,7 +20,8 @@ from ...predictors.context import Context, predicted
 from ...predictors.physics_model.correction import Correction, beside_simulation, correctable
 from ...records import Dataset
 from ...registry import reason
-from ...replay.frame import prediction_notes
+from ...replay.frame import prediction_notes, turns_against
+from ...ship import Ship
 from ...signals import MOTION, STATES, R, U, V
 from ...specs import Spec
 from ..result import Calibrated
@@ -180,8 +181,14 @@ class Rollouts:
         motion = np.concatenate([s0[:, None, MOTION], S[:, num - 1 :: num, MOTION]], axis=1)
         return cls(seg, motion)
 
-    def said(self) -> list[str]:
-        """Warning on rollouts in which a simulation has no finite position."""
+    def said(self, ship: Ship) -> list[str]:
+        """Warnings on rollouts in which a simulation has no finite position, or turns to the other side."""
+        rates = [
+            (mine[m, R], true[m, R]) for mine, true, m in zip(self.motion, self.seg.states, self.seg.mask, strict=True)
+        ]
+        return [*self._lost(), *turns_against(rates, ship, self.seg.dt)]
+
+    def _lost(self) -> list[str]:
         lost = self.seg.mask & ~np.isfinite(self.motion[..., :2]).all(axis=2)
         rows = lost.any(axis=1)
         if not rows.any():

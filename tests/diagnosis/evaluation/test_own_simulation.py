@@ -100,6 +100,6 @@ def test_rollouts_without_a_finite_position_are_told(harbour):
         return S
 
     alone = Rollouts.of(harbour, OwnSimulation(spec_of(lost), harbour), None)
-    [said] = alone.said()
+    [said] = alone.said(harbour.ship)
     assert said.startswith("your simulation has no finite position in 16 of 16 open-loop rollouts, the earliest after")
-    assert OwnSimulation(spec_of(still), harbour).alone(harbour).said() == []
+    assert OwnSimulation(spec_of(still), harbour).alone(harbour).said(harbour.ship) == []
