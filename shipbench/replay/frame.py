@@ -13,7 +13,7 @@ from ..effects.unit_or_sign_error import FACTORS
 from ..predictors.predictions import Trajectory, size_text
 from ..records import Run
 from ..ship import Ship
-from ..signals import DELTA, PSI, STATES, N, R, U, V, wrap_angle
+from ..signals import COMMANDS, DELTA, PSI, STATES, N, R, U, V, wrap_angle
 from .thresholds import THRESHOLDS
 
 Pair = tuple[Trajectory, Run]
@@ -202,9 +202,11 @@ def _unit_notes(pairs: Sequence[Pair], ship: Ship, source: str) -> list[str]:
         spread = float(np.sum(np.abs(true - true.mean())))
         agrees = max(THRESHOLDS.value("explained") * size, THRESHOLDS.value("other_unit") * spread)
         if left[best] <= min(THRESHOLDS.value("explained") * plain, agrees):
+            line = f"{name} = -{name}" if units[best] == -1.0 else f"{name} = {name} / {units[best]:.5g}"
             here, there = float(np.median(np.abs(mine))), float(np.median(np.abs(true)))
             notes.append(
                 f"{name} at the start is {here:.3g} where {there:.3g} was measured (medians of the size). Probable "
-                f"cause: {best}; correct {source} by {name} = {name} / {units[best]:.5g}."
+                f"cause: {best}; correct {source} by {line}."
+                + (f" Check whether it takes {name}_c alike." if f"{name}_c" in COMMANDS else "")
             )
     return notes

@@ -77,12 +77,16 @@ def test_states_that_a_simulation_returns_are_told_apart_alike(data):
     assert note.endswith("angles in degrees; correct the states that the simulation returns by psi = radians(psi).")
 
 
-@pytest.mark.parametrize(("name", "factor", "said"), [("n", 1 / 60, "rev/s"), ("delta", np.rad2deg(1.0), "deg")])
+@pytest.mark.parametrize(
+    ("name", "factor", "said"),
+    [("n", 1 / 60, "rev/s"), ("delta", np.rad2deg(1.0), "deg"), ("delta", -1.0, "by delta = -delta.")],
+)
 def test_actuators_in_another_unit_are_told(harbour, name, factor, said):
     S = np.stack([run.states[1:] for run in harbour.runs])
     S[..., STATES.index(name)] *= factor
     [note] = prediction_notes(S, harbour.runs, harbour.ship, harbour.dt)
     assert said in note
+    assert note.endswith(f"Check whether it takes {name}_c alike.")
 
 
 def test_a_simulation_that_starts_at_zero_is_told(data):
