@@ -78,6 +78,7 @@ def test_the_command_explains_an_fmu_and_writes_its_draft(tmp_path, monkeypatch)
     assert "FMI 2, model-exchange and co-simulation" in told or "FMI 2, co-simulation and model-exchange" in told
     assert "surge_velocity [m/s]" in told
     assert "To be completed" in told
+    assert "It does not run here: ship.fmu has libraries for no platform" in " ".join(told.split())
     written = run.invoke(app, ["models", "ship.fmu", "--propose", "ship.fmu.toml"])
     assert written.exit_code == 0
     assert "shipbench check ship.fmu" in written.output
@@ -85,6 +86,7 @@ def test_the_command_explains_an_fmu_and_writes_its_draft(tmp_path, monkeypatch)
     assert document["mapping"] == "complete"
     assert document["parameter"][-1]["name"] == "trouble"
     assert document["parameter"][-1]["low"] is None
+    assert document["runs_here"] is False
     refused = run.invoke(app, ["models", "physics", "--propose", "x.toml"])
     assert isinstance(refused.exception, InputError) or refused.exit_code == 2
 
@@ -95,3 +97,9 @@ def test_a_unit_in_the_name_counts_where_the_description_has_none(drafted):
     assert 'delta_c = { variable = "rudder_order_deg", unit = "deg" }' in draft
     assert "[deg] by its name" in draft
     assert 'r = { variable = "yaw_rate_degs", unit = "deg/s" }' in draft
+
+
+def test_a_very_long_name_is_cut_in_the_list(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    write_archive(tmp_path / "ship.fmu", {"modelDescription.xml": description(rename={"u": "u" * 10_000})})
+    assert "uuu ... [" in CliRunner().invoke(app, ["models", "ship.fmu"]).output
