@@ -253,6 +253,13 @@ def _identity(part: Part, key: str, answer: Answer) -> dict[str, Any]:
     return identity
 
 
+_KNOWS = (
+    "it was fitted to these runs, so that its errors are smaller than on other runs. Its diagnosis states those on "
+    "held-out runs"
+)
+"""Note on a model that knows the scored runs."""
+
+
 @dataclass(frozen=True, eq=False)
 class _Record:
     rows: Frame
@@ -281,7 +288,9 @@ def _score(study: Study, spec: Spec, cell: Cell, answer: Answer) -> _Record:
         first = next((i for i, s in enumerate(statuses) if s == status != "ok"), None)
         reason = "" if first is None else f"run {batch.ids[first]}: {reasons[first]}"
         if notes.get("learns") is False and "replay_report" not in notes:
-            notes["frame_notes"] = prediction_notes(S, study.folds[cell.fold].test.runs, data.ship, data.dt)
+            notes["simulation_notes"] = prediction_notes(S, study.folds[cell.fold].test.runs, data.ship, data.dt)
+            if notes.get("fitted_to") == data.fingerprint:
+                notes["simulation_notes"].append(_KNOWS)
     times = {"fit_s": answer.fit_s, "fit_shared_by": answer.shared_by, "predict_s": answer.predict_s}
     rows = _rows(study, cell, statuses, reasons, values, times)
     outcome = {"status": status, "reason": reason, "run_status": statuses, "machine": answer.machine, **notes}

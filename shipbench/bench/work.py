@@ -97,7 +97,8 @@ class Answer:
         parameters: count of the fitted numbers (see `cost`), or None if it is unknown.
         files: saved model and fitted equations, content by relative name.
         notes: reason why the model could not be saved or described, its error on its own training runs
-            (`fit_report`), and whether it learns nothing from them.
+            (`fit_report`), whether it learns nothing
+            from them, and the data set that it knows.
         machine: where it was computed.
         code: digests by relative name of the user's code that was loaded in the end, and of the files that the model
             read; empty for other models.
@@ -278,6 +279,8 @@ def _predicted(fit: _Fit, fold: FoldData) -> Answer:
         notes["replay_report"] = report.as_dict()
     if getattr(fit.model, "learns", True) is False:
         notes["learns"] = False
+    if fitted_to := getattr(fit.model, "fitted_to", ""):
+        notes["fitted_to"] = str(fitted_to)
     return Answer(
         "", "", S, fit.seconds, fit.shared_by, predict_s, params, count_parameters(fit.model), files, notes,
         skipped=skipped,

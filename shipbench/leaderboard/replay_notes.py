@@ -23,7 +23,7 @@ def _notes(cells: Iterable[Mapping[str, Any]]) -> list[str]:
     cells = list(cells)
     reports = [report for cell in cells if (report := _report(cell)) is not None]
     if not reports:
-        frames = [cell["frame_notes"] for cell in cells if isinstance(cell.get("frame_notes"), list)]
+        frames = [cell["simulation_notes"] for cell in cells if isinstance(cell.get("simulation_notes"), list)]
         return [str(note) for note in next((notes for notes in frames if notes), [])]
     starts, read = [_starts(reports)], dict.fromkeys(note for report in reports for note in report.notes)
     statuses = [status for cell in cells for status in cell["run_status"]]

@@ -32,7 +32,8 @@ class Simulator:
     inputs) and S (K, 10).
 
     A function with an argument `context` is given the `Context` of the runs. `settings` are further arguments of the
-    function, by name. A run on which the function raises has no states (NaN); the others go on.
+    function, by name. Its attribute `fitted_to`, if any, is the fingerprint of a data set whose runs it knows. A run on
+    which the function raises has no states (NaN); the others go on.
 
     Raises:
         InputError: the function cannot be called with (s0, U, dt), or has no argument of a setting's name.
@@ -44,6 +45,7 @@ class Simulator:
     def __init__(self, function: Callable[..., Any], settings: Mapping[str, Any] | None = None) -> None:
         self.function, self.settings = function, dict(settings or {})
         self.name = getattr(function, "__name__", type(function).__name__)
+        self.fitted_to = str(getattr(function, "fitted_to", ""))
         self.dt = float("nan")
         self.inputs: tuple[str, ...] = COMMANDS
         self._single: bool | None = None

@@ -33,8 +33,8 @@ def test_a_start_that_no_file_holds_and_a_malformed_report():
 
 def test_the_frame_of_a_simulation_is_told_once():
     cells = [
-        {"dataset": "toy", "model": "sim.py:simulate", "run_status": ["ok"], "frame_notes": [f"{n} deg"]}
+        {"dataset": "toy", "model": "sim.py:simulate", "run_status": ["ok"], "simulation_notes": [f"{n} deg"]}
         for n in (1, 2)
     ]
     assert replay_notes(cells) == {("toy", "sim.py:simulate"): ["1 deg"]}
-    assert replay_notes([{**cells[0], "frame_notes": "all"}]) == {}
+    assert replay_notes([{**cells[0], "simulation_notes": "all"}]) == {}

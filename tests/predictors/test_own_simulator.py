@@ -201,3 +201,16 @@ def test_a_function_that_takes_both_is_asked_for_batches(harbour, axis, calls):
     S = model.predict(batch.s0, batch.U)
     np.testing.assert_allclose(S[:, 0, 0], batch.s0[:, 0] + batch.s0[:, 3])
     assert len(asked) == calls
+
+
+def test_scores_of_a_function_that_knows_the_runs_say_so(harbour):
+    def still(s0, U, dt):
+        return np.repeat(s0[:, None], U.shape[1], axis=1)
+
+    def notes(fingerprint: str) -> list[list[str]]:
+        vars(still)["fitted_to"] = fingerprint
+        scores = benchmark([still], harbour, horizon=20, folds=2, quiet=True)
+        return [summary["simulation_notes"] for summary in scores.results.summaries]
+
+    assert all("it was fitted to these runs" in note for [note] in notes(harbour.fingerprint))
+    assert notes("of other runs") == [[], []]

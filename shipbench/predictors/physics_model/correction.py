@@ -212,11 +212,12 @@ class Correction:
         return both[0] - both[1]
 
 
-def corrected_simulation(spec: str, folder: Path) -> Callable[..., np.ndarray]:
+def corrected_simulation(spec: str, folder: Path, fitted_to: str = "") -> Callable[..., np.ndarray]:
     """Function `simulate(s0, U, dt, *, context)` of a simulation with the correction in `folder`/correction.
 
     Args:
         spec: of the simulation, its path relative to `folder`.
+        fitted_to: fingerprint of the data set whose runs the correction knows; a study of these says so.
 
     Raises:
         InputError: the simulation or the correction cannot be read.
@@ -232,6 +233,7 @@ def corrected_simulation(spec: str, folder: Path) -> Callable[..., np.ndarray]:
             models[dt] = model if asked.saved else model.fit(_in_name(context))
         return correction.predict(models[dt], s0, U, dt, context)
 
+    vars(corrected)["fitted_to"] = fitted_to
     return corrected
 
 

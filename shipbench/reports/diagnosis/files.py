@@ -52,7 +52,9 @@ def write_correction(d: Diagnosis, folder: Path) -> list[Path]:
     text = d.simulation.replace(str(spec.path), Path(place).as_posix(), 1)
     found = "; ".join(in_words(c) for c in d.causes) or "nothing beyond the ship's own coefficients"
     return [
-        write_text(folder / _CORRECTED, _MODULE.format(found=repr(found), spec=repr(text))),
+        write_text(
+            folder / _CORRECTED, _MODULE.format(found=repr(found), spec=repr(text), fingerprint=repr(d.fingerprint))
+        ),
         _write_law(d, folder),
     ]
 
@@ -77,7 +79,9 @@ from shipbench.predictors.physics_model.correction import corrected_simulation
 FOUND = {found}
 SIMULATION = {spec}
 """Its place is relative to this file."""
-corrected = corrected_simulation(SIMULATION, Path(__file__).parent)
+FITTED_TO = {fingerprint}
+"""Fingerprint of the data set whose runs the correction knows."""
+corrected = corrected_simulation(SIMULATION, Path(__file__).parent, FITTED_TO)
 """Function (s0, U, dt, context) -> S, as `simulate`; force_law.txt has its coefficients."""
 '''
 """Text of corrected.py; every word from outside is the `repr` of a string."""

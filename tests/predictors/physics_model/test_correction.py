@@ -77,7 +77,8 @@ def test_a_saved_correction_makes_the_same_model(harbour, simulation, correction
     )
     (tmp_path / "out").mkdir()
     correction.save(tmp_path / "out" / "correction")
-    corrected = corrected_simulation("../sim.py:mmg", tmp_path / "out")
+    corrected = corrected_simulation("../sim.py:mmg", tmp_path / "out", "f1")
+    assert Simulator(corrected).fitted_to == "f1"
     batch = harbour.batch()
     S = corrected(batch.s0, batch.U, harbour.dt, context=Context.of(harbour))
     np.testing.assert_array_equal(S, correction.predict(simulation, batch.s0, batch.U, harbour.dt))
