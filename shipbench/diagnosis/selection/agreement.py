@@ -201,6 +201,26 @@ def _record_noise(seg: Segments, channel: str) -> float:
 
 
 def matters(fit: Fit, index: int) -> bool:
-    """Whether a cause is practically significant; of one with a value for each run, their root mean square counts."""
+    """Whether a cause is practically significant; of one with a value for each run, their root mean square counts. Lag
+    and delay of one actuator must be so together: where one takes back what the other does, what is left is smoother,
+    but no later, as is a record that was filtered."""
     term, squares = fit.model.terms[index], np.sum(np.square(fit.values[index]), axis=-1)
-    return bool(np.mean(squares) >= least_size(fit, term) ** 2)
+    shared = term.effect.traits.gear_field in _LATER and not term.per_run
+    together = _later(fit, term) if shared else np.inf
+    return bool(min(np.mean(squares), together**2) >= least_size(fit, term) ** 2)
+
+
+_LATER = ("T", "delay")
+"""Times of an actuator that make the motion later, to first order by as much."""
+
+
+def _later(fit: Fit, term: Term) -> float:
+    """Time by which lag and delay of the actuator of `term` make the motion later together, in its typical size."""
+    alike = [
+        float(np.mean(value)) * float(fit.scales.amplitudes(other, fit.plant.c.L)[0])
+        for other, value in zip(fit.model.terms, fit.values, strict=True)
+        if other.effect.traits.gear_field in _LATER
+        and not other.per_run
+        and other.effect.acts_through == term.effect.acts_through
+    ]
+    return sum(alike) / float(fit.scales.amplitudes(term, fit.plant.c.L)[0])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -164,11 +164,10 @@ def analyse(
     unknown, rival = _unknown(selection, gears, search)
     generic, left = tuple(search.found), None
     if selection.final.model.terms:
-        generic = tuple(dependences(selection.final))
-        left = next(
-            (d for d in generic if d.score > asked(d, selection.off_form) and (d.of_sensor or d.variable in NO_FORM)),
-            None,
-        )
+        beside = Search(selection.final)
+        generic = tuple(beside.found)
+        doubtful = (d for d in generic if d.of_sensor or d.variable in NO_FORM)
+        left = next(iter(_beyond_form(doubtful, selection.off_form, beside)), None)
         left = None if left is None or left.has_name else left
     errors = [*misread, *judged(null, [e for e in errors if e.actuator not in {m.actuator for m in misread}])]
     if is_spent():
@@ -203,6 +202,14 @@ def asked(d: Dependence, off_form: float) -> float:
     return beyond + times * off_form if d.taken > least else np.inf
 
 
+def _beyond_form(found: Iterable[Dependence], off_form: float, search: Search) -> list[Dependence]:
+    """First few dependences that have the score that is asked, and beside a form error of the ship that of any unknown
+    cause."""
+    first = [d for d in found if d.score > asked(d, off_form)][: THRESHOLDS.count("refits")]
+    beyond = THRESHOLDS.value("evidence_beyond_library")
+    return [d for d in first if is_spent() or search.beside_form(d) > beyond]
+
+
 def _unknown(
     selection: Selection, gears: Sequence[GearFinding], search: Search
 ) -> tuple[Dependence | None, Dependence | None]:
@@ -212,9 +219,9 @@ def _unknown(
     worth = (
         max([2.0 * (selection.final.evidence - selection.null.evidence), *(g.score for g in gears)]) if named else 0.0
     )
-    least, first = THRESHOLDS.value("prediction_share") * worth, THRESHOLDS.count("refits")
-    found = [d for d in search.found if d.score > max(asked(d, selection.off_form), least)]
-    contenders = [d if is_spent() else search.settled(d) for d in found[:first]] if named else found[:1]
+    least = THRESHOLDS.value("prediction_share") * worth
+    found = _beyond_form((d for d in search.found if d.score > least), selection.off_form, search)
+    contenders = [d if is_spent() else search.settled(d) for d in found] if named else found[:1]
     best, margin = max(contenders, key=lambda d: d.score, default=None), THRESHOLD
     if best is None or best.has_name:
         return None, None

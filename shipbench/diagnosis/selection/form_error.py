@@ -38,11 +38,17 @@ class FormError:
         self.fit = fit
 
     @cached_property
-    def _wider(self) -> tuple[Gram, list[Tried]]:
-        """Gram with the columns of the form error, and these."""
-        wider = Wider.of(self.fit)
-        forms = _forms(wider.lin)
-        return wider.gram(forms), forms
+    def _base(self) -> Wider:
+        return Wider.of(self.fit)
+
+    @cached_property
+    def _forms(self) -> list[Tried]:
+        return _forms(self._base.lin)
+
+    @cached_property
+    def _gram(self) -> Gram:
+        """Gram with the columns of the form error."""
+        return self._base.gram(self._forms)
 
     def score(self, index: int) -> float:
         """Score of the index-th cause (2 log Bayes factor, less its cost) beside an ordinary form error. Where a
@@ -54,17 +60,30 @@ class FormError:
     def evidence(self, spread: Sequence[float], prior: Prior | None = None) -> float:
         """Log evidence beside a form error with standard deviations `spread` (3,) on the axes [force scales]."""
         prior = prior or self.fit.prior
-        gram, forms = self._wider
-        sd = _spreads(forms, spread)
+        sd = _spreads(self._forms, spread)
         on = np.flatnonzero(sd)
-        base = len(self.fit.prior.shared) + len(self.fit.prior.random)
-        shared, random = np.append(prior.shared, base + on), prior.random
-        inside = np.concatenate([shared, random]).astype(int)
-        wider = Prior(
-            np.arange(len(shared)), np.append(prior.precision, sd[on] ** -2.0), len(shared) + np.arange(len(random)),
-            prior.log_tau2,
-        )  # fmt: skip
-        return evidence(gram.only(inside), wider, self.fit.hyper.log_force)[0]
+        at = len(self.fit.prior.shared) + len(self.fit.prior.random) + on
+        shared, precision = np.append(prior.shared, at), np.append(prior.precision, sd[on] ** -2.0)
+        return self._evidence(self._gram, replace(prior, shared=shared, precision=precision))
+
+    def _evidence(self, gram: Gram, prior: Prior) -> float:
+        """Log evidence of the columns of a prior, with re-estimated variances of the force."""
+        inside = np.concatenate([prior.shared, prior.random]).astype(int)
+        shared = np.arange(len(prior.shared))
+        own = replace(prior, shared=shared, random=len(shared) + np.arange(len(prior.random)))
+        return evidence(gram.only(inside), own, self.fit.hyper.log_force)[0]
+
+    def gain(self, tried: Sequence[Tried], beside: Sequence[Tried] = ()) -> float:
+        """Score of further columns beside an ordinary form error, and beside the columns `beside`."""
+        gram = self._base.gram([*beside, *self._forms, *tried])
+        prior, size, sides = self.fit.prior, sum(t.size for t in tried), sum(t.size for t in beside)
+        precision = np.concatenate([prior.precision, np.ones(sides), _spreads(self._forms, ORDINARY) ** -2.0])
+        first = len(prior.shared) + len(prior.random)
+        shared = np.append(prior.shared, first + np.arange(len(precision) - len(prior.precision)))
+        null = replace(prior, shared=shared, precision=precision)
+        at = len(gram.slope[0]) - 1 - size + np.arange(size)
+        more = replace(null, shared=np.append(shared, at), precision=np.append(precision, np.ones(size)))
+        return 2.0 * (self._evidence(gram, more) - self._evidence(gram, null) - sum(t.cost for t in tried))
 
     def without(self, index: int) -> Prior:
         """Prior of the model without the index-th cause, but for what the form of a hull makes of it."""

@@ -17,6 +17,7 @@ from ...estimation.whitening import products_of
 from ..thresholds import THRESHOLDS
 from .features import of_forces, of_sensors
 from .form_columns import AXES, Tried, Wider, added, pushed
+from .form_error import FormError
 from .screening import evidence
 
 SENSORS = {"recorded heading": 2, "recorded surge": 3, "recorded sway": 4, "recorded yaw rate": 5}
@@ -119,6 +120,10 @@ class Search:
         parts, usual = self._parts[d], self._settled([])
         score = 2.0 * (self._settled(parts) - usual - sum(t.cost for t in parts))
         return replace(d, score=max(score, d.score, *(self._refitted(t) for t in parts if d.of_sensor)))
+
+    def beside_form(self, d: Dependence) -> float:
+        """Score of a dependence beside an ordinary form error of the ship."""
+        return FormError(self.fit).gain(self._parts[d], self.sides)
 
     def _of_runs(self, tried: Sequence[Tried]) -> float:
         """Twice the log Bayes factor of the forces `tried` with coefficients of its own in each run."""

@@ -166,6 +166,14 @@ def test_a_time_of_less_than_half_a_sample_does_not_matter(dt: float, wanted: bo
     assert matters(_sized("rudder_stall", np.array([0.7]), dt), 0)
 
 
+@pytest.mark.parametrize(("delay", "wanted"), [(-2.9, False), (0.0, True), (2.9, True)])
+def test_a_lag_that_a_record_as_late_takes_back_does_not_matter(delay: float, wanted: bool):
+    """A towing tank's record was smoother than the motion: its rudder was 0.39 s late, with a lag of 0.42 s."""
+    terms = [Term(EFFECTS.get(name)) for name in ("rudder_lag", "rudder_delay")]
+    fit = made_fit(terms, [np.array([1.0]), np.array([delay / 1.5])], made_plant(3, dt=0.5))
+    assert matters(fit, 0) is wanted  # 3 s at 130 m
+
+
 @pytest.mark.parametrize(("lag", "wanted"), [(0.93, False), (4.3, True)])
 def test_a_ship_whose_lift_follows_late_has_no_slow_gear(lag: float, wanted: bool):
     """A tanker of 120 m without a cause, whose lift builds up over a third of a length."""

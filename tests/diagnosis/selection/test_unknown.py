@@ -72,6 +72,21 @@ def test_a_pull_on_two_axes_is_judged_on_both_and_not_taken_for_the_hull(kcs):
         assert (first.variable, first.form, set(first.axis.split(" and "))) == ("nothing", "constant", {"sway", "yaw"})
         single = max(d.score for d in found if d.variable == "nothing" and d.axis in ("sway", "yaw"))
         assert first.score > single + 10.0
+    assert Search(fit).beside_form(alone[0]) > 20.0  # far more than an ordinary error of the fitted form
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("moment", "unknown"), [(2e-4, False), (1e-3, True)])
+def test_with_exact_sensors_a_small_constant_moment_may_be_the_form_of_the_ship(moment: float, unknown: bool):
+    def push(e: Modifiers, s: Flow, q: Sequence[Array], ship: Particulars) -> None:
+        e.push(0.0, 0.0, q[0] * ship.mass * ship.L)
+
+    hidden = Hidden(Outside("a moment to one side", ("nothing",), push), (moment,))
+    plant = Plant.of(sea_trials(load_mmg_ship("kcs"), 11, (hidden,), Trials(runs=8, noise=0.1, gusts=0.0)))
+    search = Search(null_fit(plant, Scales(plant)))
+    best = next(d for d in search.found if (d.axis, d.variable) == ("yaw", "nothing"))
+    assert best.score > 20.0
+    assert (search.beside_form(best) > 20.0) is unknown
 
 
 @pytest.mark.long
