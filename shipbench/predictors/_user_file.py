@@ -65,21 +65,25 @@ def class_from_file(path: Path, class_name: str) -> Any:
 
 
 def models_in(path: Path) -> list[str]:
-    """Classes of a Python file that have `fit` and `predict`, or else all its classes; read, not imported. None where
-    it is not Python."""
+    """Classes of a Python file that have `fit` and `predict`, or `simulate`, and functions of (s0, U, dt); or else all
+    its classes. It is read, not imported; none where it is not Python."""
     try:
-        found = [node for node in ast.parse(read_text(path, "Python file")).body if isinstance(node, ast.ClassDef)]
+        body = ast.parse(read_text(path, "Python file")).body
     except (InputError, SyntaxError, ValueError):
         return []
-    methods = [{part.name for part in node.body if isinstance(part, ast.FunctionDef)} for node in found]
-    return [node.name for node, own in zip(found, methods, strict=True) if {"fit", "predict"} <= own] or [
-        node.name for node in found
-    ]
+    found = []
+    for node in body:
+        if isinstance(node, ast.FunctionDef) and [a.arg for a in node.args.args[:3]] == ["s0", "U", "dt"]:
+            found.append(node.name)
+        if isinstance(node, ast.ClassDef):
+            methods = {part.name for part in node.body if isinstance(part, ast.FunctionDef)}
+            found += [node.name] * ({"fit", "predict"} <= methods or "simulate" in methods)
+    return found or [node.name for node in body if isinstance(node, ast.ClassDef)]
 
 
 def spec_in_file(name: str) -> str:
-    """Spec suggested for the name of a file without its class, or of a class without its file; "" where there is no
-    such file here."""
+    """Spec suggested for the name of a file without its class or function, or of one of these without its file; ""
+    where there is no such file here."""
     if name.endswith(".py"):
         return " or ".join(f"{name}:{model}" for model in models_in(Path(name)))
     files = islice(Path().glob("*.py"), _MOST_FILES) if name.isidentifier() else ()

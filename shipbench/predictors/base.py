@@ -7,6 +7,7 @@ spec sets (`mlp[hidden=64,seed=3]`); `_arrays` returns the fitted arrays and `_r
 from __future__ import annotations
 
 import copy
+import inspect
 from abc import ABC, abstractmethod
 from dataclasses import asdict, fields, is_dataclass
 from pathlib import Path
@@ -302,7 +303,7 @@ def _made(spec: Spec) -> Any:
         return _of_file(spec)
     family, _, member = (spec.name, "", "") if spec.path is not None else spec.name.partition(":")
     if spec.path is None and family not in PREDICTORS and (meant := spec_in_file(family)):
-        half = "a file without its class" if family.endswith(".py") else "a class without its file"
+        half = "a file without its class or function" if family.endswith(".py") else "a class without its file"
         raise InputError(f"model spec '{spec.text}' names {half}. Give {meant}.")
     cls = class_from_file(spec.path, str(spec.class_name)) if spec.path is not None else PREDICTORS.get(family)
     if spec.path is None and hasattr(cls, "of_file"):
@@ -328,4 +329,15 @@ def _made(spec: Spec) -> Any:
         model = cls(**params)
         return model.extend(spec.effects) if spec.effects else model
     except (TypeError, ValueError) as error:
-        raise InputError(f"model spec '{spec.text}': {error}. See `shipbench models` for the parameters.") from None
+        known = (
+            "See `shipbench models` for the parameters" if spec.path is None else f"Its arguments: {_arguments(cls)}"
+        )
+        raise InputError(f"model spec '{spec.text}': {error}. {known}.") from None
+
+
+def _arguments(part: Any) -> str:
+    """Arguments with which a class or function of the user's is made or called, as it writes them."""
+    try:
+        return str(inspect.signature(part))
+    except (TypeError, ValueError):  # some have none
+        return "unknown"

@@ -78,7 +78,12 @@ def test_no_rule_of_the_contract_is_broken(file, name):
 
 @pytest.mark.parametrize(
     ("name", "said"),
-    [("two", "cannot be called as simulate"), ("whole[pace=2]", "pace"), ("nothing", "Known: Mine, asks, one")],
+    [
+        ("two", "cannot be called as simulate"),
+        ("Mine[sped=2.0]", r"'sped'. Its arguments: \(speed=1.0\)"),
+        ("whole[pace=2]", "pace"),
+        ("nothing", "Known: Mine, asks, one"),
+    ],
 )
 def test_a_function_that_cannot_be_called_is_refused_with_its_arguments(file, name, said):
     with pytest.raises(InputError, match=said):
@@ -214,3 +219,8 @@ def test_scores_of_a_function_that_knows_the_runs_say_so(harbour):
 
     assert all("it was fitted to these runs" in note for [note] in notes(harbour.fingerprint))
     assert notes("of other runs") == [[], []]
+
+
+def test_a_file_alone_is_answered_with_its_functions(file):
+    with pytest.raises(InputError, match=rf"names a file without its class or function. Give {file}:whole or .*:Mine"):
+        make_predictor(str(file))
