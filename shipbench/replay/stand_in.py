@@ -15,9 +15,10 @@ from ..metrics.ed import ed
 from ..predictors.calibrated import Calibrated
 from ..predictors.predictions import Trajectory
 from ..records import Dataset, Run
-from ..signals import ACTUATORS, COMMANDS
+from ..signals import ACTUATORS, COMMANDS, X, Y
 from ..specs import Spec, spec_of
 from .bind import bound
+from .frame import frame_notes
 
 _VALIDATION = 9
 """One of so many trajectories decides whether rollouts refine the fit, as in `shipbench run`."""
@@ -36,12 +37,15 @@ def stand_in(spec: Spec, data: Dataset) -> StandIn:
     """Stand-in for predicted trajectories; any other simulation as it is.
 
     Raises:
-        InputError: no trajectory can be read, matched to a run of `data`, or fitted.
+        InputError: no trajectory can be read, matched to a run of `data`, or fitted, or their unit or frame is another.
     """
     if spec.reader != "predictions":
         return StandIn(spec)
     matched = bound(spec, data).matched
-    predicted = _as_runs(data, {} if matched is None else matched.runs)
+    tracks = {} if matched is None else matched.runs
+    if notes := frame_notes(_moved(data, tracks), data.ship, data.dt):
+        raise InputError(f"{spec.text}: {notes[0]}")
+    predicted = _as_runs(data, tracks)
     valid = range(0, len(predicted), _VALIDATION)
     train = [i for i in range(len(predicted)) if i not in valid]
     model = Calibrated()
@@ -61,6 +65,18 @@ def stand_in(spec: Spec, data: Dataset) -> StandIn:
         "error of your simulation. With the simulator itself (--model sim.py:simulate) nothing stands in."
     )
     return StandIn(spec_of(simulate, spec.text), note)
+
+
+def _moved(data: Dataset, tracks: dict[str, tuple[Trajectory, ...]]) -> list[tuple[Trajectory, Run]]:
+    """Trajectories with their runs, each moved to the measured start: their origin does not matter here."""
+    pairs = []
+    for run in data.runs:
+        for track in tracks.get(run.id, ()):
+            first = min(max(round((track.start - float(run.t[0])) / data.dt), 0), len(run) - 1)
+            states = track.states.copy()
+            states[:, [X, Y]] += run.states[first, [X, Y]] - states[0, [X, Y]]
+            pairs.append((Trajectory(track.start, states), run))
+    return pairs
 
 
 def _as_runs(data: Dataset, tracks: dict[str, tuple[Trajectory, ...]]) -> Dataset:

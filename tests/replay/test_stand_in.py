@@ -43,3 +43,15 @@ def test_trajectories_that_are_too_short_are_refused(harbour, tmp_path):
     table.to_csv(tmp_path / "short.csv", index=False)
     with pytest.raises(InputError, match="3 samples"):
         stand_in(parse_spec(f"predictions:{tmp_path / 'short.csv'}"), harbour)
+
+
+@pytest.mark.parametrize("fault", ["degrees", "origin"])
+def test_another_unit_is_refused_and_another_origin_is_not(harbour, tmp_path, fault):
+    table = long_table(harbour.runs[:4])[["trajectory", "t", "x", "y", "psi"]]
+    other = {"degrees": {"psi": np.rad2deg(table["psi"])}, "origin": {"x": table["x"] + 3000.0}}[fault]
+    table = table.assign(**other)
+    table = table if fault == "degrees" else table.groupby("trajectory").head(2)  # too short to be fitted
+    table.to_csv(tmp_path / "other.csv", index=False)
+    said = "angles in degrees; correct the files" if fault == "degrees" else "3 samples"
+    with pytest.raises(InputError, match=said):
+        stand_in(parse_spec(f"predictions:{tmp_path / 'other.csv'}"), harbour)
