@@ -68,7 +68,8 @@ class Verdict:
 
 
 class Requirement:
-    """Requirement on the index-th cause of a model. `of_size`: it is checked last, when all others are met."""
+    """Requirement on the index-th cause of a model. `of_size`: it tells whether ordinary ships have as much, and is
+    checked last, when all others are met: what they have is a part of the ship, beside which others are judged."""
 
     of_size = False
 
@@ -156,6 +157,8 @@ class BeyondForm(Requirement):
     """Evidence beside a form error, too: what the fitted form of a ship lacks repeats in every run, and with exact
     sensors passes for a cause."""
 
+    of_size = True
+
     def check(self, fit: Fit, index: int, standard: Standard) -> Verdict:
         score = FormError(fit).score(index)
         return Verdict(
@@ -192,11 +195,12 @@ class Significant(Requirement):
 
 EVIDENCE, SIGNIFICANT, SAME_SHIP, BEYOND_FORM = Evidence(), Significant(), SameShip(), BeyondForm()
 REQUIREMENTS: tuple[Requirement, ...] = (
-    EVIDENCE, Plausible(), OrdinaryShip(), NoImitation(), ConstantWithinRuns(), RunsAgree(), BEYOND_FORM, SAME_SHIP,
+    EVIDENCE, Plausible(), OrdinaryShip(), NoImitation(), ConstantWithinRuns(), RunsAgree(), SAME_SHIP, BEYOND_FORM,
     SIGNIFICANT,
 )  # fmt: skip
 """Requirements in the order in which they are checked."""
-SURE = tuple(r for r in REQUIREMENTS if r not in (EVIDENCE, SAME_SHIP) and not r.of_size)
+ABOVE_ORDINARY = tuple(r for r in REQUIREMENTS if r.of_size)
+SURE = tuple(r for r in REQUIREMENTS if r not in (EVIDENCE, SAME_SHIP, *ABOVE_ORDINARY))
 """Requirements on a cause by itself: evidence is checked by refits, and the ship is compared with that of the baseline
 model once the causes are chosen."""
 

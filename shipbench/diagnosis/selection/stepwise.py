@@ -20,7 +20,7 @@ from ...estimation.term import Term
 from ..thresholds import THRESHOLDS
 from .applicable import why_not
 from .backward import needed_only, wanted_only
-from .requirements import SAME_SHIP, SIGNIFICANT, SURE, Standard, first_unmet
+from .requirements import ABOVE_ORDINARY, SAME_SHIP, SIGNIFICANT, SURE, Standard, first_unmet
 from .screening import Score, changes, glance, overlap, screen
 
 CONFUSED = THRESHOLDS.value("evidence")
@@ -57,7 +57,7 @@ class Selection:
     found; scores: of every candidate in the first round, and `last` beside the final model; off_form: further score
     required of a cause confounded with the form of a hull (`Standard.asked_besides`); unmet: effects above the
     threshold that are not identified, with the first requirement that they do not meet; small: the baseline model with
-    those of them that are not practically significant, where nothing else was found.
+    those of them of which ordinary ships have as much, where nothing else was found.
     """
 
     null: Fit
@@ -194,7 +194,7 @@ def select(null: Fit, threshold: float) -> Selection:
     pruned = needed_only(now, standard, spare_last=False)
     pruned, unsure = wanted_only(pruned, (*SURE, SAME_SHIP), standard)
     whole = pruned
-    pruned, small = wanted_only(pruned, (SIGNIFICANT,), standard)
+    pruned, small = wanted_only(pruned, ABOVE_ORDINARY, standard)
     if pruned is not now:
         now = looking_at(pruned, null.candidates)
         sure, more = wanted_only(now, SURE, standard) if small else (now, {})  # without what is too small, too

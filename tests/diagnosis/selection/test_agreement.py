@@ -21,7 +21,7 @@ from shipbench.diagnosis.selection.agreement import (
     least_size,
     matters,
 )
-from shipbench.diagnosis.selection.requirements import BEYOND_FORM, SURE, Standard, first_unmet
+from shipbench.diagnosis.selection.requirements import SURE, Standard, first_unmet
 from shipbench.effects.base import EFFECTS
 from shipbench.estimation.coefficients import NUM_BASE, PLACES
 from shipbench.estimation.forward import ordinary_gears
@@ -31,9 +31,8 @@ from shipbench.signals import DELTA
 
 
 def is_sure(fit: Fit, index: int) -> bool:
-    """Whether a cause meets all requirements on a cause by itself; beside a form error a ship is sailed, and these fits
-    are made by hand."""
-    return first_unmet([r for r in SURE if r is not BEYOND_FORM], fit, index, Standard(fit, 10.0)).met
+    """Whether a cause meets all requirements on a cause by itself."""
+    return first_unmet(SURE, fit, index, Standard(fit, 10.0)).met
 
 
 def test_runs_that_scatter_as_the_model_says_are_not_inflated():

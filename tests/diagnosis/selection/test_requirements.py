@@ -12,7 +12,6 @@ from made_fits import RUNS, fit_of, made_fit
 
 from shipbench.diagnosis.selection import requirements
 from shipbench.diagnosis.selection.requirements import (
-    BEYOND_FORM,
     REQUIREMENTS,
     SURE,
     Requirement,
@@ -95,11 +94,10 @@ def test_the_effect_of_the_example_package_is_a_candidate_and_meets_the_same_req
     )  # neither differs between ships
     assert standard.asked_besides(Term(effect, since=3)) == 5.0
     own = fit_of(np.full(RUNS, 0.5), term=term)
-    by_itself = [r for r in SURE if r is not BEYOND_FORM]  # beside a form error a ship is sailed
-    met = first_unmet(by_itself, own, 0, standard)
+    met = first_unmet(SURE, own, 0, standard)
     assert met == Verdict(True)
     scattered = fit_of(0.5 + 3.0 * np.resize([1.0, -1.0], RUNS), term=term)
-    assert first_unmet(by_itself, scattered, 0, standard) == Verdict(
+    assert first_unmet(SURE, scattered, 0, standard) == Verdict(
         False, "the runs do not agree that its size differs from zero"
     )
 
