@@ -182,7 +182,9 @@ def _with_gear(found: Fit, name: str, field: str) -> Fit:
 
 
 def _behind(found: Fit, name: str, field: str, value: float) -> Fit:
+    """Fit behind another gear, given up where its predicted evidence is below that of `found`."""
     plant = found.plant.driven({name: replace(found.plant.ordinary[name], **{field: value})})
     return fit(
-        plant, found.scales, found.model, found.point, found.hyper, iterations=REFIT_ITERATIONS, guess=found.motion
-    )
+        plant, found.scales, found.model, found.point, found.hyper, iterations=REFIT_ITERATIONS, guess=found.motion,
+        hope=found.evidence - 0.5 * THRESHOLDS.value("unconverged_excess"), rival=found.evidence,
+    )  # fmt: skip

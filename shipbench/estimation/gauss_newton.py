@@ -12,7 +12,18 @@ from .budget import count, is_spent
 from .coefficients import NUM_BASE
 from .forward import Plant
 from .gram import Hyper
-from .laplace import Fit, Model, at_point, by_segment, leaning, objective, point_from, settle, suiting
+from .laplace import (
+    Fit,
+    Model,
+    at_point,
+    by_segment,
+    leaning,
+    objective,
+    once_followed,
+    point_from,
+    settle,
+    suiting,
+)
 from .linearisation import Linearisation, Point, Scales
 from .term import Term
 from .thresholds import THRESHOLDS
@@ -28,13 +39,14 @@ _AT_REST, _AT_REST_EVIDENCE = 0.5, 0.1
 def fit(
     plant: Plant, scales: Scales, model: Model, point: Point, hyper: Hyper, log_tau2: dict[int, float] | None = None, *,
     iterations: int = 20,
-    candidates: Sequence[Term] = (), guess: np.ndarray | None = None, hope: float = -np.inf, far: bool = False,
-    begun: tuple[Linearisation, Fit] | None = None, free_steps: int = _FREE_STEPS,
+    candidates: Sequence[Term] = (), guess: np.ndarray | None = None, hope: float = -np.inf, rival: float = -np.inf,
+    far: bool = False, begun: tuple[Linearisation, Fit] | None = None, free_steps: int = _FREE_STEPS,
 ) -> Fit:  # fmt: skip
     """Gauss-Newton with EM for the variances, from `point` to convergence.
 
     `point` may lack the last terms of `model`: they start at zero. The fit stops early when its predicted log evidence
-    is below `hope`, or when the time budget is spent.
+    is below `hope`, or when the time budget is spent. After the free steps it stops when the prediction is below
+    `rival` by more than twice its last change.
 
     A step is at first halved only where the cost diverges. The cost of a step that is right for the parameters rises
     until the latent force has followed; otherwise the path would end where parameters compensate each other. The best
@@ -47,7 +59,7 @@ def fit(
         new = [np.zeros((plant.seg.runs, t.size) if t.per_run else t.size) for t in model.terms[len(point.terms) :]]
         point = Point(point.base, point.eta, point.w, model.terms, (*point.values, *new))
     lin, seen = begun or (Linearisation(plant, scales, point, guess), None)
-    best, before, promised, stale, early = None, -np.inf, -np.inf, 0, np.nan
+    best, before, promised, stale, early, foreseen = None, -np.inf, -np.inf, 0, np.nan, np.inf
     for number in range(iterations):
         free = number < free_steps  # later, variances move little, or two linearisations may alternate for ever
         found = settle(lin, model, hyper, log_tau2, leap=np.inf if free else 0.3, seen=seen, far=far and not number)
@@ -57,6 +69,9 @@ def fit(
             early = found.promise
         if number and found.promise < hope:
             return found
+        if not free and found.promise + 2.0 * abs(found.promise - foreseen) < rival:
+            return found
+        foreseen = found.promise
         hyper, log_tau2 = found.hyper, found.log_tau2
         worth = float(np.nan_to_num(found.evidence if free else found.evidence_followed, nan=-np.inf))
         if free or best is None or worth > best[0] + _AT_REST_EVIDENCE or found.promise > promised + _AT_REST_EVIDENCE:
@@ -71,19 +86,16 @@ def fit(
         if is_spent() or stale == 3 or (found.excess < _AT_REST and abs(found.evidence - before) < _AT_REST_EVIDENCE):
             break
         before = found.evidence
-        after, seen = (
-            _step(lin, found, number + 1 < free_steps, 0.5**stale) if number < iterations - 1 else (None, None)
-        )
+        after = _step(lin, found, number + 1 < free_steps, 0.5**stale) if number < iterations - 1 else None
         if after is None:
             break
-        lin = after
+        lin, seen = after, None
     assert best is not None
     found, lin = _followed(*best[1:])
     if free_steps and found.excess > THRESHOLDS.value("led_astray") and not is_spent():
         again = fit(
             plant, scales, model, point, *began, iterations=iterations, candidates=candidates, guess=guess, hope=hope,
-            far=far, begun=begun,
-            free_steps=0,
+            rival=rival, far=far, begun=begun, free_steps=0,
         )  # fmt: skip
         if again.evidence > found.evidence:
             return again
@@ -104,8 +116,8 @@ def looking_at(found: Fit, candidates: Sequence[Term]) -> Fit:
     return fit(plant, scales, model, found.point, hyper, log_tau2, candidates=candidates, guess=found.motion)
 
 
-def _step(lin: Linearisation, found: Fit, free: bool, share: float) -> tuple[Linearisation | None, Fit | None]:
-    """Step towards the optimum of the linear model, and the fit there if one was made.
+def _step(lin: Linearisation, found: Fit, free: bool, share: float) -> Linearisation | None:
+    """Step towards the optimum of the linear model.
 
     None where no share of the step, from `share` down, is better (the first steps are `free`). A point is better if its
     cost is lower, or would be once the latent force has followed. With exact sensors the trajectory of a new point
@@ -113,26 +125,23 @@ def _step(lin: Linearisation, found: Fit, free: bool, share: float) -> tuple[Lin
     """
     plant, scales, model, may_rise = lin.plant, lin.scales, found.model, 1.1 if free else 1.0
     target = within_bounds(plant, scales, point_from(model, lin.point, found.solution, found.prior, found.estimate))
-    at, followed, share = (
-        objective(lin, model, found.hyper, found.log_tau2, found.gram),
-        at_point(found, lin.point),
-        share,
-    )
+    at = objective(lin, model, found.hyper, found.log_tau2, found.gram)
+    followed = at_point(found, lin.point) + float(np.sum(found.reduced.logdet))
     while not is_spent():
         part = between(lin.point, target, share)
         trial = Linearisation(plant, scales, part, lin.towards(part), coarse=free)
         cost = objective(trial, model, found.hyper, found.log_tau2, found.gram)
         if cost + leaning(found, part) < may_rise * at:
-            return trial, None
-        seen = settle(trial, model, found.hyper, found.log_tau2, leap=0.0) if cost < _MAY_FOLLOW * at else None
-        if seen is not None and at_point(seen, part) + np.sum(seen.reduced.logdet - found.reduced.logdet) < followed:
-            return trial, seen
+            return trial
+        may_follow = cost < _MAY_FOLLOW * at
+        if may_follow and once_followed(trial, model, found.hyper, found.log_tau2) < followed:
+            return trial
         share *= 0.5
-        if share < _LEAST_SHARE and free and cost < _MAY_FOLLOW * at:
-            return trial, seen
+        if share < _LEAST_SHARE and free and may_follow:
+            return trial
         if share < (1e-3 if free else _LEAST_SHARE):
             break
-    return None, None
+    return None
 
 
 def _followed(found: Fit, lin: Linearisation) -> tuple[Fit, Linearisation]:

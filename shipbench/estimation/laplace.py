@@ -117,6 +117,11 @@ class Fit:
         """Covariances (B, Z, Z) of `estimate`."""
         return background_cov(self.gram, self.reduced, self.prior, self.solution)
 
+    @cached_property
+    def own_products(self) -> Products:
+        """Products without the columns of the candidates."""
+        return self.products.without(sum(t.size for t in self.candidates))
+
     @property
     def values(self) -> tuple[np.ndarray, ...]:
         """Estimates of the terms' amplitudes, in units of their typical sizes: (size,), or (runs, size) of a random
@@ -191,6 +196,17 @@ def at_point(found: Fit, point: Point) -> float:
     )
 
 
+def once_followed(lin: Linearisation, model: Model, hyper: Hyper, log_tau2: dict[int, float]) -> float:
+    """Twice the negative log posterior at the parameters and values of the point of a linearisation, with the initial
+    states and latent force that maximise it there, and with their log determinants: `at_point` of a fit there, and the
+    sum of its `reduced.logdet`. It needs no sensitivities to parameters and values."""
+    point, nothing = lin.point, np.zeros((len(lin.motion), lin.latent.shape[1], 0))
+    columns = Columns(lin.predicted, lin.latent, nothing, (), (), ())
+    alone = products_of(lin.plant, lin.scales, replace(point, base=np.zeros(0), terms=(), values=()), columns)
+    reduced = replace(alone, initial=_of_initial_states(alone, lin.scales, hyper)).weigh(hyper).reduce(hyper.log_force)
+    return float(np.sum(reduced.S) + np.sum(reduced.logdet)) + prior_squares(model, point, log_tau2)
+
+
 def leaning(found: Fit, point: Point) -> float:
     """Curvature term: rise of the log determinant of the latent force at a point, as the linearisation of `found`
     predicts it."""
@@ -253,25 +269,25 @@ def sloped(
     reward lower variances. The derivatives are zero where the latent force stands in for the parameters (`far`).
     """
     alone = products.without(products.shared)
-
-    def taken_off() -> np.ndarray:
-        seen = lin.scales.background or hyper
-        return -log_determinant(alone.weigh(seen).reduce(seen.log_force).inverse[:, :6, :6])
-
     flat = np.zeros((len(products.run), products.slope.shape[1] - 1))
     by_column = flat if far else slopes(lin, columns, alone.weigh(hyper).reduce(hyper.log_force).inverse, hyper)
-    initial = products.initial if known and lin.scales.background else taken_off()
+    kept = known and lin.scales.background
+    initial = products.initial if kept else _of_initial_states(alone, lin.scales, hyper)
     return products.sloped(by_column, coefficients_at(lin, columns), initial)
+
+
+def _of_initial_states(alone: Products, scales: Scales, hyper: Hyper) -> np.ndarray:
+    """Part (B,) of the log determinants that belongs to initial states, of products without shared columns."""
+    seen = scales.background or hyper
+    return -log_determinant(alone.weigh(seen).reduce(seen.log_force).inverse[:, :6, :6])
 
 
 def evidence_with(found: Fit, colour: Colour) -> float:
     """Log evidence of the same linearisation under another noise model, with its variances fitted anew."""
-    other = colour.differs(found.scales.colour)
-    part = products_of(found.plant, found.scales.coloured(colour), found.point, found.columns, other)
-    known = dict(enumerate(found.products.P)) | dict(zip(other, part.P, strict=True))
-    products = replace(found.products, P=tuple(known.values()), colour=part.colour).without(
-        sum(t.size for t in found.candidates)
-    )
+    other, columns = colour.differs(found.scales.colour), replace(found.columns, candidates=())
+    part = products_of(found.plant, found.scales.coloured(colour), found.point, columns, other)
+    known = dict(enumerate(found.own_products.P)) | dict(zip(other, part.P, strict=True))
+    products = replace(found.own_products, P=tuple(known.values()), colour=part.colour)
     hyper, log_tau2 = _variances(products, found.model, found.hyper, found.log_tau2, 1)
     return solve(products.weigh(hyper).reduce(hyper.log_force), found.model.prior(log_tau2)).log_evidence
 
@@ -286,7 +302,7 @@ def hull_evidence(found: Fit) -> float:
 def with_hull(found: Fit, width: float) -> Solution:
     """Posterior on the same linearisation with the prior standard deviations of the hull times `width`, and with all
     variances fitted anew."""
-    products, model = found.products.without(sum(t.size for t in found.candidates)), replace(found.model, hull=width)
+    products, model = found.own_products, replace(found.model, hull=width)
     hyper, log_tau2 = _variances(products, model, found.hyper, found.log_tau2, _EM_CYCLES)
     return solve(products.weigh(hyper).reduce(hyper.log_force), model.prior(log_tau2))
 

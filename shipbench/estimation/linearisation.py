@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -154,11 +155,23 @@ class Linearisation:
         """All sensitivities."""
         self._look_aside()
         base, own = self.parameter_columns()
-        self.pulses = self._pulses()
+        return Columns(
+            self.predicted, self.latent, base, own, tuple(self._of_candidates(candidates)), tuple(self.bends)
+        )
+
+    @cached_property
+    def pulses(self) -> np.ndarray:
+        """Change of each step's end by each knot of the latent acceleration, (K, B, 6, 3 knots)."""
+        middle = 0.5 * (self.plant.hat[:-1] + self.plant.hat[1:])
+        ends = (self.reach * self.scales.w)[..., None] * middle[:, None, None, None, :]
+        return np.asarray(ends.reshape(*self.here.shape, -1))
+
+    @cached_property
+    def latent(self) -> np.ndarray:
+        """Sensitivities (B, T, 6 + 3 knots) to initial states and latent force."""
         first = np.zeros((self.here.shape[1], 6, 6 + self.pulses.shape[-1]))
         first[..., :6] = np.diag(self.scales.eta)
-        latent = self._chained(np.concatenate([np.zeros((*self.here.shape, 6)), self.pulses], axis=-1), first)
-        return Columns(self.predicted, latent, base, own, tuple(self._of_candidates(candidates)), tuple(self.bends))
+        return self._chained(np.concatenate([np.zeros((*self.here.shape, 6)), self.pulses], axis=-1), first)
 
     @_quiet
     def parameter_columns(self, free: Sequence[int] = range(NUM_BASE)) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:
@@ -231,12 +244,6 @@ class Linearisation:
         """Changes (K, B, 6, D) of the steps' ends by changes of the acceleration (D, K, B, 3). It takes one evaluation
         of the forces instead of the four of a step."""
         return np.asarray(self.reach @ np.moveaxis(rates, 0, -1))
-
-    def _pulses(self) -> np.ndarray:
-        """Change of each step's end by each knot of the latent acceleration, (K, B, 6, 3 knots)."""
-        middle = 0.5 * (self.plant.hat[:-1] + self.plant.hat[1:])
-        ends = (self.reach * self.scales.w)[..., None] * middle[:, None, None, None, :]
-        return np.asarray(ends.reshape(*self.here.shape, -1))
 
     def _chain(self, sources: np.ndarray, first: np.ndarray | None = None) -> np.ndarray:
         """Change of the motion (B, K + 1, 6, D) from changes of the steps' ends (K, B, 6, D) and of the initial states

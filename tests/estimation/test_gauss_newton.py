@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 from shipbench.diagnosis.selection.screening import _changes, screen
-from shipbench.diagnosis.selection.stepwise import Beginning, candidates_for
+from shipbench.diagnosis.selection.stepwise import Beginning, candidates_for, refits
 from shipbench.effects.base import EFFECTS
 from shipbench.estimation import gauss_newton as refit
 from shipbench.estimation.baseline import null_fit
 from shipbench.estimation.forward import Plant
 from shipbench.estimation.gauss_newton import Origin, fit, looking_at
 from shipbench.estimation.gram import background, background_cov, update_force
-from shipbench.estimation.laplace import Fit, Model, hull_evidence, settle
+from shipbench.estimation.laplace import Fit, Model, at_point, hull_evidence, once_followed, settle
 from shipbench.estimation.linearisation import Linearisation, Scales
 from shipbench.estimation.thresholds import THRESHOLDS
 from shipbench.physics.mmg import load_mmg_ship
@@ -57,13 +57,36 @@ def test_a_refit_from_the_shared_linearisation_is_the_one_from_its_own(null):
         assert together.refit(scores[name]).evidence == pytest.approx(alone.refit(scores[name]).evidence, abs=1e-3)
 
 
+def test_the_cost_once_the_force_has_followed_needs_no_other_sensitivities(null):
+    """A trial point is judged by it many times a fit."""
+    point = replace(null.point, base=null.point.base + 0.3)
+    lin = Linearisation(null.plant, null.scales, point, null.motion, coarse=False)
+    cost = once_followed(lin, null.model, null.hyper, null.log_tau2)
+    whole = settle(lin, null.model, null.hyper, null.log_tau2, leap=0.0)
+    assert cost == pytest.approx(at_point(whole, point) + np.sum(whole.reduced.logdet), rel=1e-9)
+
+
+def test_a_refit_that_cannot_be_the_best_is_given_up_and_the_best_is_not(null):
+    """Of ten refits on a record of 2.5 h seven went on to rest, 90 to 270 of log evidence behind the best."""
+    origin, scores = Origin.of(null.plant, null.scales), {s.term.label: s for s in reversed(screen(null))}
+    start = Beginning.of(null, origin, [s.term for s in scores.values()])
+    best, other = start.refit(scores["heading_bias"]), start.refit(scores["rudder_delay"])
+    gain = 2.0 * (best.evidence - null.evidence)
+    assert start.refit(scores["heading_bias"], rival=gain - 40.0).evidence == best.evidence
+    less = start.refit(scores["rudder_delay"], rival=gain - 40.0)
+    assert less.evidence <= other.evidence < best.evidence - 20.0
+    assert 2.0 * (less.promise - null.evidence) < gain - 40.0
+    of_all = refits(null, [scores["rudder_delay"], scores["heading_bias"]], origin, 10.0, lambda f: gain)
+    assert max(score for _, score in of_all) == pytest.approx(gain)
+
+
 def test_where_free_steps_lead_astray_each_step_lowers_the_cost(null, monkeypatch):
     """A current on a ship of 56 m with positions of 1.5 m noise: the first step raised the cost twelve times, and no
     later one came back."""
     origin, model, real = Origin.of(null.plant, null.scales), Model(), refit._step
 
     def astray(lin, found, free, share):
-        return (None, None) if free else real(lin, found, free, share)
+        return None if free else real(lin, found, free, share)
 
     def fitted(lost: float) -> float:
         row = THRESHOLDS.rows["led_astray"]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product, takewhile
 
@@ -118,8 +118,9 @@ class Beginning:
         lin = Linearisation(now.plant, now.scales, at, origin.motion)
         return cls(now, origin, lin, settle(lin, now.model, origin.hyper, now.log_tau2, terms, far=True))
 
-    def refit(self, score: Score, least: float = -np.inf) -> Fit:
-        """Fit of the model with one more term, given up where its predicted gain is below `least`."""
+    def refit(self, score: Score, least: float = -np.inf, rival: float = -np.inf) -> Fit:
+        """Fit of the model with one more term, given up where its predicted gain is below `least`, or below `rival`
+        once the prediction is near (`gauss_newton.fit`)."""
         now, term, columns, candidates = self.now, score.term, self.seen.columns, self.seen.candidates
         place, shared = candidates.index(term), self.seen.products.shared
         at, inside = shared - sum(t.size for t in candidates[place:]), shared - sum(t.size for t in candidates)
@@ -130,7 +131,6 @@ class Beginning:
         )  # fmt: skip
         lin, model = self.lin.holding(place, term), replace(now.model, terms=(*now.model.terms, term))
         log_tau2 = now.log_tau2 | ({len(now.model.terms): score.log_tau2} if term.per_run else {})
-        hope = now.evidence + 0.5 * least
         return fit(
             now.plant,
             now.scales,
@@ -139,44 +139,62 @@ class Beginning:
             self.origin.hyper,
             log_tau2,
             iterations=REFIT_ITERATIONS,
-            hope=hope,
+            hope=now.evidence + 0.5 * least,
+            rival=now.evidence + 0.5 * rival,
             far=True,
             begun=(lin, held),
         )
 
 
-def refits(now: Fit, scores: Sequence[Score], origin: Origin, threshold: float) -> list[tuple[Fit, float]]:
+def refits(
+    now: Fit,
+    scores: Sequence[Score],
+    origin: Origin,
+    threshold: float,
+    worth: Callable[[Fit], float] = lambda _: -np.inf,
+) -> list[tuple[Fit, float]]:
     """Refits of `now` with each of the candidates, and the score of each (2 log Bayes factor), or its predicted score
-    when it was given up beside a better one above the threshold.
+    when it was given up beside a better one above the threshold: one whose gain `worth` neither it nor what is
+    reported as confounded with that could still be.
 
-    They are in the order of their scores at `origin`, where refits begin: the first is mostly the best, beside which
-    others are given up soon.
+    They are in the order of their scores, the better one of that beside `now` and of that at `origin`, where refits
+    begin: the first is mostly the best, beside which others are given up soon.
     """
     if not scores:
         return []
     start = Beginning.of(now, origin, [s.term for s in scores])
-    seen = {s.term: s.score for s in glance(start.seen)}
-    found, best, least = list[tuple[Fit, float]](), threshold, -np.inf
-    for score in sorted(scores, key=lambda s: -seen[s.term]):
+    ranks = [
+        {s.term: rank for rank, s in enumerate(sorted(of, key=lambda s: -s.score))}
+        for of in (glance(start.seen), scores)
+    ]
+    found, best, least, rival = list[tuple[Fit, float]](), threshold, -np.inf, -np.inf
+    for score in sorted(scores, key=lambda s: min(rank[s.term] for rank in ranks)):
         if is_spent():
             break
-        tried = start.refit(score, least)
+        # the variance of values of single runs is still growing when the rest of a prediction is near
+        tried = start.refit(score, least, -np.inf if score.term.per_run else rival)
         if threshold - THRESHOLDS.value("tie") < 2.0 * (tried.evidence - now.evidence) < threshold:
             tried = fit(
                 tried.plant, tried.scales, tried.model, tried.point, tried.hyper, tried.log_tau2, guess=tried.motion
             )
         gained, promised = 2.0 * (tried.evidence - now.evidence), 2.0 * (tried.promise - now.evidence)
-        found.append((tried, promised if promised < least else gained))
+        found.append((tried, promised if promised < max(least, rival) else gained))
+        if (beyond := worth(tried)) > threshold:
+            rival = max(rival, beyond - max(CONFUSED, THRESHOLDS.value("minor_share") * beyond) - _FAR)
         if gained > best:
             best, least = gained, _least(tried, now)
     return found
 
 
+_FAR = THRESHOLDS.value("unconverged_excess")
+"""Amount by which a refit that has not converged may still gain."""
+
+
 def _least(best: Fit, now: Fit) -> float:
     """Predicted gain that a refit needs beside the best one; less by the amount by which that one's prediction fell
     short."""
-    share, margin = THRESHOLDS.value("prediction_share"), THRESHOLDS.value("unconverged_excess")
-    return 2.0 * (share * (best.evidence - now.evidence) - max(best.promise - best.early, 0.0)) - margin
+    share = THRESHOLDS.value("prediction_share")
+    return 2.0 * (share * (best.evidence - now.evidence) - max(best.promise - best.early, 0.0)) - _FAR
 
 
 def select(null: Fit, threshold: float) -> Selection:
@@ -245,9 +263,9 @@ def _grown(null: Fit, threshold: float, again: bool = False) -> _Grown:
     origin = Origin.of(null.plant, null.scales)
     for round_ in takewhile(lambda _: not is_spent(), range(THRESHOLDS.count("causes"))):
         now = state.now
-        tried = refits(now, worth_a_refit(state.scores, now, threshold), origin, threshold)
+        tried = refits(now, worth_a_refit(state.scores, now, threshold), origin, threshold, state.gain)
         if not is_spent() and all(2.0 * (f.evidence - now.evidence) < threshold for f, _ in tried):
-            tried += refits(now, absorbed([f for f, _ in tried], now, threshold, origin), origin, threshold)
+            tried += refits(now, absorbed([f for f, _ in tried], now, threshold, origin), origin, threshold, state.gain)
         state.steps.extend(Step.of(round_, f, now, score) for f, score in tried)
         for f, score in tried:
             if score > threshold and not (size := SIGNIFICANT.check(f, -1, standard)).met:
