@@ -182,9 +182,11 @@ def _with_gear(found: Fit, name: str, field: str) -> Fit:
 
 
 def _behind(found: Fit, name: str, field: str, value: float) -> Fit:
-    """Fit behind another gear, given up where its predicted evidence is below that of `found`."""
+    """Fit behind another gear, given up where its predicted evidence is below that of `found` by what predictions fall
+    short: after the first step, and when they are near (docs/calibration.md#refits)."""
+    early, near = (0.5 * THRESHOLDS.value(name) for name in ("led_astray", "unconverged_excess"))
     plant = found.plant.driven({name: replace(found.plant.ordinary[name], **{field: value})})
     return fit(
         plant, found.scales, found.model, found.point, found.hyper, iterations=REFIT_ITERATIONS, guess=found.motion,
-        hope=found.evidence - 0.5 * THRESHOLDS.value("unconverged_excess"), rival=found.evidence,
+        hope=found.evidence - early, rival=found.evidence - near,
     )  # fmt: skip
