@@ -11,6 +11,7 @@ import pytest
 from shipbench.diagnosis.selection.screening import _changes, screen
 from shipbench.diagnosis.selection.stepwise import Beginning, candidates_for, refits
 from shipbench.effects.base import EFFECTS
+from shipbench.estimation import baseline
 from shipbench.estimation import gauss_newton as refit
 from shipbench.estimation.baseline import null_fit
 from shipbench.estimation.forward import Plant
@@ -78,6 +79,21 @@ def test_a_refit_that_cannot_be_the_best_is_given_up_and_the_best_is_not(null):
     assert 2.0 * (less.promise - null.evidence) < gain - 40.0
     of_all = refits(null, [scores["rudder_delay"], scores["heading_bias"]], origin, 10.0, lambda f: gain)
     assert max(score for _, score in of_all) == pytest.approx(gain)
+
+
+@pytest.mark.long
+def test_a_gear_that_fits_worse_is_given_up_and_the_best_is_not(monkeypatch):
+    trials = sea_trials(load_mmg_ship("container130"), 4, (), Trials(runs=8, samples=70))
+    plant = Plant.of(replace(trials, actuators="commanded"))
+    quick, real = null_fit(plant, Scales(plant)), baseline.fit
+
+    def to_rest(*given, hope=None, rival=None, **others):
+        return real(*given, **others)
+
+    monkeypatch.setattr(baseline, "fit", to_rest)
+    whole = null_fit(plant, Scales(plant))
+    assert quick.plant.ordinary == whole.plant.ordinary
+    assert quick.evidence == pytest.approx(whole.evidence, abs=0.1)
 
 
 def test_where_free_steps_lead_astray_each_step_lowers_the_cost(null, monkeypatch):
