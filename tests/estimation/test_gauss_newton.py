@@ -161,7 +161,7 @@ def test_changes_at_many_runs_are_those_of_each_alone():
     base, prior, cols = np.array([0, 1]), np.array([1.0, 0.5]), np.array([2, 4])
     gated = np.cumsum(S[::-1], axis=0)[::-1]
     scores, values = _changes(S.sum(axis=0), gated[[3, 6]], base, prior, cols, 1.5)
-    keep = [0, 1, 2, 4]
+    keep = np.array([0, 1, 2, 4])
     precision = np.array([1.0, 0.5, 1.0, 1.0])
     for k, score, value in zip((3, 6), scores, values, strict=True):
         total, late = S.sum(axis=0), S[k:].sum(axis=0)
