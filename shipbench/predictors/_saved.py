@@ -29,8 +29,8 @@ _SHIP_DIFFERS = 0.01
 @dataclass(frozen=True)
 class Origin:
     """Training data of a model: sample time [s], inputs, actuators ("measured" or "commanded"), the ship's name, L, B,
-    T [m] and displacement [m^3], fingerprint of the training runs (empty where an older saved model does not state
-    them)."""
+    T [m] and displacement [m^3], fingerprint of the training runs and one of the motion of each (empty where an older
+    saved model does not state them)."""
 
     dt: float
     inputs: tuple[str, ...]
@@ -38,13 +38,20 @@ class Origin:
     ship: str = ""
     size: tuple[float, ...] = ()
     fingerprint: str = ""
+    runs: tuple[str, ...] = ()
 
     @classmethod
     def of(cls, data: Dataset) -> Origin:
         ship = data.ship
         volume = ship.displacement if ship.displacement is not None else float(ship.mass or 0.0) / ship.rho
         size = (ship.L, ship.B, ship.T, volume)
-        return cls(data.dt, data.inputs, data.actuators, ship.name, size, data.fingerprint)
+        return cls(data.dt, data.inputs, data.actuators, ship.name, size, data.fingerprint, _of_runs(data))
+
+
+def _of_runs(data: Dataset) -> tuple[str, ...]:
+    """Fingerprint of the motion of every run."""
+    motions = (np.ascontiguousarray(run.states, dtype=np.float64).tobytes() for run in data.runs)
+    return tuple(hashlib.sha256(motion).hexdigest()[:16] for motion in motions)
 
 
 def remembers_origin(fit: Callable[..., Any]) -> Callable[..., Any]:
@@ -73,8 +80,8 @@ def remembers_origins(fit_group: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def check_origin(name: str, origin: Origin | None, data: Dataset) -> list[str]:
-    """Warnings for a saved model `name` that is used on `data`: another ship, or other actuators. Each is one line of
-    the log.
+    """Warnings for a saved model `name` that is used on `data`: another ship, other actuators, or runs of its own
+    training. Each is one line of the log.
 
     Raises:
         InputError: the data have another sample time or other channels than the model was made for.
@@ -108,6 +115,11 @@ def check_origin(name: str, origin: Origin | None, data: Dataset) -> list[str]:
     if origin.actuators and origin.actuators != data.actuators:
         notes.append(
             f"the saved model {name} was fitted on {origin.actuators} actuators; these data have {data.actuators} ones"
+        )
+    if known := len(set(origin.runs) & set(here.runs)):
+        notes.append(
+            f"the saved model {name} was fitted on {known} of the {len(data)} runs: there its errors are not those of "
+            "a prediction"
         )
     for note in notes:
         _log.warning("warning: %s", note)
@@ -201,6 +213,7 @@ def origin_of(meta: dict[str, Any]) -> Origin | None:
             str(made["ship"]),
             tuple(map(float, made["size"])),
             str(made.get("fingerprint", "")),
+            tuple(map(str, made.get("runs", ()))),
         )
     inner = meta["meta"].get("physics", meta["meta"])
     return Origin(sample_time(inner), tuple(meta["inputs"])) if "dt" in inner else None

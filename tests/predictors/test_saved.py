@@ -14,7 +14,7 @@ from shipbench.bench.runner import run_tasks
 from shipbench.bench.task import make_task
 from shipbench.data.files import write_dataset
 from shipbench.errors import InputError
-from shipbench.predictors._saved import _digest
+from shipbench.predictors._saved import _digest, check_origin, origin_of, read_meta
 from shipbench.predictors.base import make_predictor, parse_spec
 
 SMALL = {"hold": "hold", "physics": "physics[iterations=1]", "mlp": "mlp[hidden=4,epochs=1]",
@@ -79,9 +79,9 @@ def test_files_cut_short_or_with_a_flipped_byte_are_one_message(saved):
                 make_predictor(parse_spec(str(folder)))
             except InputError:
                 continue
-            assert name == "model.json"  # a blank for another: the same content
-            same = json.loads((folder / name).read_text())
-            assert same == json.loads(whole)
+            assert name == "model.json"  # a blank for another, or the digest's own name: the same content
+            same, before = json.loads((folder / name).read_text()), json.loads(whole)
+            assert {key: same[key] for key in before if key != "digest"} | {"digest": before["digest"]} == before
         (folder / name).write_bytes(whole)
         make_predictor(parse_spec(str(folder)))
 
@@ -138,6 +138,18 @@ def test_a_model_saved_before_its_origin_was_kept_refuses_another_sample_time_to
     with pytest.raises(InputError, match="steps 1 s"):
         predict_runs(str(folder), _resampled(harbour, 2.0))
     assert len(predict_runs(str(folder), harbour.subset([0]))) == 1
+
+
+def test_runs_of_a_model_s_own_training_are_told(harbour, tmp_path):
+    model = make_predictor("physics")
+    model.fit(harbour.subset([0, 1, 2]))
+    model.save(tmp_path / "model")
+    origin = origin_of(read_meta(tmp_path / "model"))
+    (note,) = check_origin("mine", origin, harbour.subset([1, 2, 3, 4]))
+    assert note == (
+        "the saved model mine was fitted on 2 of the 4 runs: there its errors are not those of a prediction"
+    )
+    assert check_origin("mine", origin, harbour.subset([3, 4])) == []
 
 
 def test_other_channels_are_refused(saved, harbour):
