@@ -41,8 +41,7 @@ def covariance(fit: Fit, index: int) -> np.ndarray:
     at, term = np.flatnonzero(np.isin(fit.prior.shared, fit.columns_of(index))), fit.model.terms[index]
     wider = np.maximum(1.0, inflation(fit, at)) ** 0.5
     cov = fit.solution.cov[np.ix_(at, at)] * np.outer(wider, wider)
-    spread = np.array(term.effect.form_spread(term.setting, fit.plant.c.L))
-    return cov + np.diag((spread / fit.scales.amplitudes(term, fit.plant.c.L)) ** 2)
+    return cov + _moved_by_form(fit, term)
 
 
 def is_borne_by_one(fit: Fit, index: int) -> bool:
@@ -161,11 +160,28 @@ def bends(fit: Fit, index: int, null: Fit) -> bool:
 
 def runs_agree(fit: Fit, index: int) -> bool:
     """Whether the values of a cause that all runs share differ from zero (Hotelling's test over the runs)."""
+    return _differs(fit, index, fit.values[index], covariance(fit, index))
+
+
+def is_told_from_form(fit: Fit, index: int, value: np.ndarray, cov: np.ndarray) -> bool:
+    """Whether the values of a cause, estimated beside a form error, differ from zero, where the form of a hull also
+    moves them (`Effect.form_spread`)."""
+    return _differs(fit, index, value, cov + _moved_by_form(fit, fit.model.terms[index]))
+
+
+def _moved_by_form(fit: Fit, term: Term) -> np.ndarray:
+    """Covariance (size, size) that the form of a hull adds to the estimate of a cause, in typical sizes."""
+    length = fit.plant.c.L
+    spread = np.array(term.effect.form_spread(term.setting, length))
+    return np.diag((spread / fit.scales.amplitudes(term, length)) ** 2)
+
+
+def _differs(fit: Fit, index: int, value: np.ndarray, cov: np.ndarray) -> bool:
     from scipy.stats import f
 
-    value, num = fit.values[index], fit.plant.seg.runs
+    num = fit.plant.seg.runs
     size, free = len(value), max(num - len(value), 1)
-    squares = float(value @ np.linalg.solve(covariance(fit, index), value))
+    squares = float(value @ np.linalg.solve(cov, value))
     doubt = float(f.sf(squares * free / (size * max(num - 1, 1)), size, free))
     return doubt < (
         THRESHOLDS.value("error_probability")

@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ...estimation.gram import Gram, Prior
+from ...estimation.gram import Gram, Prior, solve
 from ...estimation.laplace import Fit
 from ...estimation.linearisation import Linearisation
 from ..thresholds import THRESHOLDS
@@ -51,27 +51,32 @@ class FormError:
         return self._base.gram(self._forms)
 
     def score(self, index: int) -> float:
-        """Score of the index-th cause (2 log Bayes factor, less its cost) beside an ordinary form error. Where a
-        form moves it (`Effect.form_spread`), what remains of it counts."""
-        fit, term = self.fit, self.fit.model.terms[index]
-        gain = self.evidence(ORDINARY, self._prior(index, 1.0)) - self.evidence(ORDINARY, self.without(index))
-        return 2.0 * gain - term.cost(fit.plant.seg.runs)
+        """Score of the index-th cause, which all runs share (2 log Bayes factor), beside an ordinary form error."""
+        return 2.0 * (self.evidence(ORDINARY) - self.evidence(ORDINARY, self.without(index)))
+
+    def estimate(self, index: int) -> tuple[np.ndarray, np.ndarray]:
+        """Value (size,) and covariance (size, size) of the index-th cause, which all runs share, beside an ordinary
+        form error, in typical sizes."""
+        gram, prior = self._with_form(self._gram, ORDINARY, self.fit.prior)
+        found = solve(gram.reduce(self.fit.hyper.log_force), prior)
+        at = np.flatnonzero(np.isin(self.fit.prior.shared, self.fit.columns_of(index)))
+        return found.mean[at], found.cov[np.ix_(at, at)]
 
     def evidence(self, spread: Sequence[float], prior: Prior | None = None) -> float:
         """Log evidence beside a form error with standard deviations `spread` (3,) on the axes [force scales]."""
-        prior = prior or self.fit.prior
+        return self._evidence(*self._with_form(self._gram, spread, prior or self.fit.prior))
+
+    def _with_form(self, gram: Gram, spread: Sequence[float], prior: Prior) -> tuple[Gram, Prior]:
+        """Columns of a prior and of a form error, and their prior."""
         sd = _spreads(self._forms, spread)
         on = np.flatnonzero(sd)
         at = len(self.fit.prior.shared) + len(self.fit.prior.random) + on
         shared, precision = np.append(prior.shared, at), np.append(prior.precision, sd[on] ** -2.0)
-        return self._evidence(self._gram, replace(prior, shared=shared, precision=precision))
+        return _only(gram, replace(prior, shared=shared, precision=precision))
 
     def _evidence(self, gram: Gram, prior: Prior) -> float:
-        """Log evidence of the columns of a prior, with re-estimated variances of the force."""
-        inside = np.concatenate([prior.shared, prior.random]).astype(int)
-        shared = np.arange(len(prior.shared))
-        own = replace(prior, shared=shared, random=len(shared) + np.arange(len(prior.random)))
-        return evidence(gram.only(inside), own, self.fit.hyper.log_force)[0]
+        """Log evidence with re-estimated variances of the force."""
+        return evidence(gram, prior, self.fit.hyper.log_force)[0]
 
     def gain(self, tried: Sequence[Tried], beside: Sequence[Tried] = ()) -> float:
         """Score of further columns beside an ordinary form error, and beside the columns `beside`."""
@@ -83,27 +88,19 @@ class FormError:
         null = replace(prior, shared=shared, precision=precision)
         at = len(gram.slope[0]) - 1 - size + np.arange(size)
         more = replace(null, shared=np.append(shared, at), precision=np.append(precision, np.ones(size)))
-        return 2.0 * (self._evidence(gram, more) - self._evidence(gram, null) - sum(t.cost for t in tried))
+        gained = self._evidence(*_only(gram, more)) - self._evidence(*_only(gram, null))
+        return 2.0 * (gained - sum(t.cost for t in tried))
 
     def without(self, index: int) -> Prior:
-        """Prior of the model without the index-th cause, but for what the form of a hull makes of it."""
-        return self._prior(index, 0.0)
+        """Prior of the model without the index-th cause, which all runs share."""
+        kept = ~np.isin(self.fit.prior.shared, self.fit.columns_of(index))
+        return replace(self.fit.prior, shared=self.fit.prior.shared[kept], precision=self.fit.prior.precision[kept])
 
-    def _prior(self, index: int, size: float) -> Prior:
-        """Prior in which the index-th cause has a standard deviation of `size` typical ones, beside what the form of a
-        hull makes of it; amplitudes of which both are zero are left out."""
-        fit, prior, term, own = self.fit, self.fit.prior, self.fit.model.terms[index], self.fit.columns_of(index)
-        if term.per_run:
-            random = prior.random[~np.isin(prior.random, own)]
-            without = replace(prior, random=random, log_tau2=prior.log_tau2[~np.isin(prior.random, own)])
-            return prior if size else without
-        length = fit.plant.c.L
-        of_form = np.array(term.effect.form_spread(term.setting, length)) / fit.scales.amplitudes(term, length)
-        variance = dict(zip(own, size**2 + of_form**2, strict=True))
-        kept = np.array([variance.get(i, 1.0) > 0.0 for i in prior.shared])
-        shared, precision = prior.shared[kept], prior.precision[kept]
-        own_precision = [1.0 / variance[i] if i in variance else p for i, p in zip(shared, precision, strict=True)]
-        return replace(prior, shared=shared, precision=np.array(own_precision))
+
+def _only(gram: Gram, prior: Prior) -> tuple[Gram, Prior]:
+    """Columns of a prior alone, and the prior in their numbers."""
+    inside, shared = np.concatenate([prior.shared, prior.random]).astype(int), np.arange(len(prior.shared))
+    return gram.only(inside), replace(prior, shared=shared, random=len(shared) + np.arange(len(prior.random)))
 
 
 def beside_form(null: Fit, scores: Sequence[Score]) -> list[Score]:
@@ -118,7 +115,7 @@ def beside_form(null: Fit, scores: Sequence[Score]) -> list[Score]:
     nuisance = np.concatenate([null.prior.shared, np.arange(end, len(S) - 1)]).astype(int)
     A = S[np.ix_(nuisance, nuisance)] + np.diag(np.append(null.prior.precision, _spreads(forms, ORDINARY) ** -2.0))
     V = S[first:end, first:end] - S[first:end, nuisance] @ np.linalg.solve(A, S[nuisance, first:end])
-    at = dict(zip(null.candidates, np.cumsum([0, *sizes[:-1]]), strict=True))
+    at = dict(zip(null.candidates, np.cumsum(sizes, dtype=int) - np.array(sizes, dtype=int), strict=True))
     return [
         s if s.term.per_run else replace(s, beside_form=V[at[s.term] :, at[s.term] :][: s.term.size, : s.term.size])
         for s in scores

@@ -17,6 +17,7 @@ from .agreement import (
     imitates,
     is_borne_by_one,
     is_on_a_ship,
+    is_told_from_form,
     lasts,
     least_size,
     matters,
@@ -155,16 +156,20 @@ class RunsAgree(Requirement):
 
 class BeyondForm(Requirement):
     """Evidence beside a form error, too: what the fitted form of a ship lacks repeats in every run, and with exact
-    sensors passes for a cause."""
+    sensors passes for a cause. Values of single runs differ, as a form error does not."""
 
     of_size = True
 
     def check(self, fit: Fit, index: int, standard: Standard) -> Verdict:
-        score = FormError(fit).score(index)
-        return Verdict(
-            score >= standard.threshold,
-            f"score {score:.1f} beside an ordinary error of the ship's fitted form, below {standard.threshold:g}",
-        )
+        if fit.model.terms[index].per_run:
+            return Verdict(True)
+        form = FormError(fit)
+        score = form.score(index)
+        if score < standard.threshold:
+            beside = "beside an ordinary error of the ship's fitted form"
+            return Verdict(False, f"score {score:.1f} {beside}, below {standard.threshold:g}")
+        told = is_told_from_form(fit, index, *form.estimate(index))
+        return Verdict(told, "the form of a hull moves its estimate by as much")
 
     def least_size(self, seen: Score, standard: Standard) -> np.ndarray | float:
         return 0.0 if seen.beside_form is None else _least_amplitudes(seen.beside_form, standard.threshold)

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
-from shipbench.diagnosis.selection.form_error import FormError
+from shipbench.diagnosis.selection.form_error import FormError, beside_form
+from shipbench.diagnosis.selection.requirements import BEYOND_FORM, Standard
 from shipbench.diagnosis.thresholds import THRESHOLDS
 from shipbench.effects.base import EFFECTS
 from shipbench.estimation.baseline import null_fit
@@ -55,4 +58,14 @@ def test_where_only_a_form_tells_a_place_on_the_ship_the_place_is_no_cause():
     velocities are its own."""
     plant = Plant.of(published_trials(PUBLISHED["navy"], 7, (), Trials(runs=12, noise=0.1, gusts=0.0)))
     found = with_cause(plant, "antenna_offset", 1.0)
-    assert found.worth(0) > THRESHOLDS.value("evidence") > FormError(found).score(0)
+    assert found.worth(0) > THRESHOLDS.value("evidence")
+    assert not BEYOND_FORM.check(found, 0, Standard(found, THRESHOLDS.value("evidence"))).met
+
+
+def test_values_of_single_runs_are_no_form_error(offset):
+    fit = replace(offset, model=Model(terms=(Term(EFFECTS.get("current_per_run"), (), True),)))
+    assert BEYOND_FORM.check(fit, 0, Standard(fit, 1e9)).met
+
+
+def test_without_candidates_no_information_is_asked_for(offset):
+    assert beside_form(offset, []) == []
