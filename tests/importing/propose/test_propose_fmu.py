@@ -102,4 +102,5 @@ def test_a_unit_in_the_name_counts_where_the_description_has_none(drafted):
 def test_a_very_long_name_is_cut_in_the_list(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     write_archive(tmp_path / "ship.fmu", {"modelDescription.xml": description(rename={"u": "u" * 10_000})})
-    assert "uuu ... [" in CliRunner().invoke(app, ["models", "ship.fmu"]).output
+    said = CliRunner().invoke(app, ["models", "ship.fmu"]).output
+    assert "uuu ... [" in " ".join(said.split())  # wherever a line ends
