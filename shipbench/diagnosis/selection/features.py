@@ -13,6 +13,8 @@ from ...physics.wind import apparent_wind
 from ..thresholds import THRESHOLDS
 
 Features = tuple[np.ndarray, ...]
+OUTSIDE = ("heading", "position", "time", "waves", "run", "measured wind")
+"""Variables outside the ship, on which the force of no hull, rudder or propeller depends."""
 _CENTRED = ("heading", "position", "run")
 """Variables of which only differences count: a force that is always there does not depend on them."""
 

@@ -16,12 +16,9 @@ from ...estimation.gram import Gram, Prior, solve
 from ...estimation.laplace import Fit
 from ...estimation.linearisation import Linearisation
 from ..thresholds import THRESHOLDS
-from .features import of_forces
+from .features import OUTSIDE, of_forces
 from .form_columns import AXES, Tried, Wider, pushed
 from .screening import Score, evidence
-
-NOT_OF_FORM = frozenset({"heading", "position", "time", "waves", "run", "measured wind", "thrusters"})
-"""Variables on which the hull, rudder and propeller of a ship do not depend."""
 
 ORDINARY = (THRESHOLDS.value("least_spread"),) * len(AXES)
 """Standard deviations of the form error on the axes, in force scales: the least latent force, in every run the same."""
@@ -124,7 +121,7 @@ def beside_form(null: Fit, scores: Sequence[Score]) -> list[Score]:
 
 def _forms(lin: Linearisation) -> list[Tried]:
     """Columns of every form of a force in the ship's own variables, on each axis."""
-    forms = {v: of for v, of in of_forces(lin).items() if v not in NOT_OF_FORM}
+    forms = {v: of for v, of in of_forces(lin).items() if v not in (*OUTSIDE, "thrusters")}
     return [t for axis in range(len(AXES)) for t in pushed(lin, axis, forms)]
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import groupby
 
 import numpy as np
@@ -15,7 +16,7 @@ from ...estimation.gram import Gram, Prior, solve
 from ...estimation.laplace import Fit, settled_evidence, sloped
 from ...estimation.whitening import products_of
 from ..thresholds import THRESHOLDS
-from .features import of_forces, of_sensors
+from .features import OUTSIDE, of_forces, of_sensors
 from .form_columns import AXES, Tried, Wider, added, pushed
 from .form_error import FormError
 from .screening import evidence
@@ -24,7 +25,7 @@ SENSORS = {"recorded heading": 2, "recorded surge": 3, "recorded sway": 4, "reco
 """Recorded quantities whose errors are searched, and their channels."""
 _NAMED = ("recorded heading", "recorded yaw rate")
 """Records whose constant errors are causes of the library."""
-NO_FORM = ("nothing", "heading", "position", "time", "waves", "run", "measured wind")
+NO_FORM = ("nothing", *OUTSIDE)
 """Variables on which no ship's form depends."""
 _BY_RUN = ("heading", "position", "waves", "run")
 """Variables with a range of its own in each run. What a model lacks of a ship differs between manoeuvres, and passes
@@ -123,7 +124,11 @@ class Search:
 
     def beside_form(self, d: Dependence) -> float:
         """Score of a dependence beside an ordinary form error of the ship."""
-        return FormError(self.fit).gain(self._parts[d], self.sides)
+        return self._form_error.gain(self._parts[d], self.sides)
+
+    @cached_property
+    def _form_error(self) -> FormError:
+        return FormError(self.fit)
 
     def _of_runs(self, tried: Sequence[Tried]) -> float:
         """Twice the log Bayes factor of the forces `tried` with coefficients of its own in each run."""
