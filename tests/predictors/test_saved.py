@@ -79,9 +79,9 @@ def test_files_cut_short_or_with_a_flipped_byte_are_one_message(saved):
                 make_predictor(parse_spec(str(folder)))
             except InputError:
                 continue
-            assert name == "model.json"  # a blank for another, or the digest's own name: the same content
-            same, before = json.loads((folder / name).read_text()), json.loads(whole)
-            assert {key: same[key] for key in before if key != "digest"} | {"digest": before["digest"]} == before
+            assert name == "model.json"  # a blank for another: the same content
+            same = json.loads((folder / name).read_text())
+            assert same == json.loads(whole)
         (folder / name).write_bytes(whole)
         make_predictor(parse_spec(str(folder)))
 
