@@ -8,13 +8,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from made_saved import signed_anew
 
 from shipbench.bench.predict import predict_runs
 from shipbench.bench.runner import run_tasks
 from shipbench.bench.task import make_task
 from shipbench.data.files import write_dataset
 from shipbench.errors import InputError
-from shipbench.predictors._saved import _digest, check_origin, origin_of, read_meta
+from shipbench.predictors._saved import check_origin, origin_of, read_meta
 from shipbench.predictors.base import make_predictor, parse_spec
 
 SMALL = {"hold": "hold", "physics": "physics[iterations=1]", "mlp": "mlp[hidden=4,epochs=1]",
@@ -37,18 +38,6 @@ def saved(fitted, tmp_path):
         return tmp_path / name
 
     return save
-
-
-def _signed_anew(folder, change_meta=lambda meta: meta, change_arrays=lambda arrays: arrays):
-    """As somebody would write a wrong model by hand, digest and all."""
-    meta = json.loads((folder / "model.json").read_text())
-    with np.load(folder / "arrays.npz") as file:
-        arrays = change_arrays({k: file[k] for k in file.files})
-    np.savez(folder / "arrays.npz", **arrays)
-    meta = change_meta({k: v for k, v in meta.items() if k != "digest"})
-    (folder / "model.json").write_text(
-        json.dumps({**meta, "digest": _digest(meta, (folder / "arrays.npz").read_bytes())})
-    )
 
 
 def _refused(folder):
@@ -94,7 +83,7 @@ def test_arrays_of_another_shape_are_refused_on_load(saved, name):
     for array in names:
         for change in (lambda a: a.ravel()[:-1], lambda a: np.array(["x"])):
             folder = saved(name)
-            _signed_anew(
+            signed_anew(
                 folder,
                 change_arrays=lambda arrays, array=array, change=change: {**arrays, array: change(arrays[array])},
             )
@@ -108,7 +97,7 @@ def test_arrays_of_another_shape_are_refused_on_load(saved, name):
 )
 def test_parameters_that_do_not_fit_the_arrays_are_refused_on_load(saved, key, value):
     folder = saved("mlp")
-    _signed_anew(folder, change_meta=lambda meta: {**meta, "params": {**meta["params"], key: value}})
+    signed_anew(folder, change_meta=lambda meta: {**meta, "params": {**meta["params"], key: value}})
     _refused(folder)
 
 
@@ -116,7 +105,7 @@ def test_parameters_that_do_not_fit_the_arrays_are_refused_on_load(saved, key, v
 @pytest.mark.parametrize("name", ["hold", "physics", "mlp"])
 def test_a_saved_model_has_a_sample_time(saved, name, dt):
     folder = saved(name)
-    _signed_anew(folder, change_meta=lambda meta: {**meta, "meta": {**meta["meta"], "dt": dt}})
+    signed_anew(folder, change_meta=lambda meta: {**meta, "meta": {**meta["meta"], "dt": dt}})
     _refused(folder)
 
 

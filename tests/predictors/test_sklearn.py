@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
 import sys
 
 import numpy as np
 import pytest
+from made_saved import signed_anew
 
 from shipbench.bench.runner import run_tasks
 from shipbench.bench.task import make_task
@@ -83,11 +83,7 @@ def test_a_saved_model_holds_no_pickle_and_is_fitted_again_to_the_same(harbour, 
 def test_a_saved_model_that_would_predict_otherwise_is_refused(harbour, tmp_path):
     """As after a change of scikit-learn's version; here it is the kept seed that is changed."""
     fitted("sklearn:RandomForestRegressor[n_estimators=3]", harbour, seed=4).save(tmp_path / "m")
-    file = tmp_path / "m" / "model.json"
-    meta = json.loads(file.read_text())
-    meta["meta"]["seed"] = 5
-    del meta["digest"]  # not a damaged file
-    file.write_text(json.dumps(meta))
+    signed_anew(tmp_path / "m", lambda meta: {**meta, "meta": {**meta["meta"], "seed": 5}})
     with pytest.raises(InputError, match=r"predicts something else\. Install scikit-learn"):
         make_predictor(parse_spec(str(tmp_path / "m")))
 

@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 import shlex
 
-from ...diagnosis.result import Candidate, Cause, Diagnosis, Estimate, Gain, NoiseFloor, what_it_is
+import numpy as np
+
+from ...diagnosis.result import Candidate, Cause, Diagnosis, Estimate, Gain, NoiseFloor, Trace, what_it_is
 from ...effects.base import EFFECTS, Effect, Parameter
 from ...render.table import display_unit
 
@@ -243,14 +245,24 @@ def drawn(d: Diagnosis) -> tuple[str, str]:
 
 
 def next_command(d: Diagnosis) -> str:
-    """Command that compares `physics` or the simulation, the calibrated ship and the proposed model on held-out runs;
-    "" where nothing else is proposed."""
+    """Command that compares `physics` or the simulation, the calibrated ship and the proposed model on held-out runs,
+    over as long as the diagnosis rolled them out; "" where nothing else is proposed."""
     if d.extended_model in ("physics", d.simulation):
         return ""
     first = [d.simulation] if d.simulation else ["physics", d.extended_model.split("+")[0]]
     models = dict.fromkeys([*first, d.extended_model])
     named = " ".join(f"--model {shlex.quote(m)}" for m in models)
-    return f"shipbench run {named} --dataset {shlex.quote(d.spec or d.dataset)}"
+    over = "" if d.trace is None else f" --horizon {_rolled_out(d.trace):g}"
+    return f"shipbench run {named} --dataset {shlex.quote(d.spec or d.dataset)}{over}"
+
+
+def _rolled_out(trace: Trace) -> float:
+    """Time [s] that at least half of the runs were rolled out for: `run` leaves out those shorter than its horizon."""
+    known = np.isfinite(trace.measured).all(axis=-1)
+    lasted = np.where(known, trace.t, 0.0).max(axis=1)  # of every segment
+    longest = np.zeros(len(trace.names))
+    np.maximum.at(longest, trace.run, lasted)
+    return float(np.quantile(longest, 0.5, method="lower"))
 
 
 def detectable(c: Candidate) -> str:

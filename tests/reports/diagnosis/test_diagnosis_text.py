@@ -3,8 +3,9 @@
 import re
 from dataclasses import replace
 
+import numpy as np
 import pytest
-from made_diagnosis import CAUSE, GAIN, make_diagnosis
+from made_diagnosis import CAUSE, GAIN, make_diagnosis, make_trace
 
 from shipbench.diagnosis.result import Calibrated, Cause, Estimate, Moved, NoiseFloor
 from shipbench.effects.base import EFFECTS
@@ -116,7 +117,7 @@ def test_without_a_cause_the_next_command_tries_the_calibrated_ship():
     none = make_diagnosis("none")
     assert next_command(none) == ""
     better = replace(none, extended_model="calibrated")
-    assert "--model physics --model calibrated --dataset trial" in next_command(better)
+    assert "--model physics --model calibrated --dataset trial --horizon 60" in next_command(better)
     assert "Model to compare: calibrated" in "\n".join(summary_lines(better))
 
 
@@ -165,8 +166,25 @@ def test_a_simulation_is_told_alone_with_coefficients_and_with_the_cause():
 
 def test_the_next_command_runs_the_simulation_beside_its_correction():
     command = next_command(judged())
-    assert command == "shipbench run --model sim.py:simulate --model out/corrected.py:corrected --dataset trial"
+    assert (
+        command
+        == "shipbench run --model sim.py:simulate --model out/corrected.py:corrected --dataset trial --horizon 60"
+    )
     assert next_command(replace(judged(), extended_model="sim.py:simulate")) == ""
+
+
+def test_the_next_command_leaves_most_runs_in_and_is_as_long_as_they_were_rolled_out():
+    """`run` leaves out runs that are shorter than its horizon of 120 s, and refuses where all are."""
+    d = make_diagnosis()
+    trace = make_trace(4)
+    assert next_command(replace(d, trace=None)).endswith("--dataset trial")
+    for lengths, seconds in (([21, 31, 41, 61], 30), ([61, 61, 11, 61], 60), ([61, 21, 31, 31], 30)):
+        measured = trace.measured.copy()
+        for row, length in enumerate(lengths):
+            measured[row, length:] = np.nan
+        assert next_command(replace(d, trace=replace(trace, measured=measured))).endswith(f"--horizon {seconds}")
+    two = replace(trace, run=np.array([0, 0, 1, 1]), names=trace.names[:2], measured=measured)  # in two pieces each
+    assert next_command(replace(d, trace=two)).endswith("--horizon 30")
 
 
 def test_a_stand_in_is_said():
