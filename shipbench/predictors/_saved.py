@@ -24,12 +24,14 @@ _LARGEST_JSON = 16_000_000
 """Most bytes of a model.json; fitted arrays are stored in arrays.npz."""
 _SHIP_DIFFERS = 0.01
 """Relative difference of a main dimension that is more than rounding in a ship file."""
+_SAMPLE = 16
+"""Digits of the fingerprint of a sample."""
 
 
 @dataclass(frozen=True)
 class Origin:
     """Training data of a model: sample time [s], inputs, actuators ("measured" or "commanded"), the ship's name, L, B,
-    T [m] and displacement [m^3], fingerprint of the training runs and one of the motion of each (empty where an older
+    T [m] and displacement [m^3], fingerprint of the training runs, and one of the ends of each (empty where an older
     saved model does not state them)."""
 
     dt: float
@@ -45,13 +47,24 @@ class Origin:
         ship = data.ship
         volume = ship.displacement if ship.displacement is not None else float(ship.mass or 0.0) / ship.rho
         size = (ship.L, ship.B, ship.T, volume)
-        return cls(data.dt, data.inputs, data.actuators, ship.name, size, data.fingerprint, _of_runs(data))
+        ends = tuple(_sample(run.states[0]) + _sample(run.states[-1]) for run in data.runs)
+        return cls(data.dt, data.inputs, data.actuators, ship.name, size, data.fingerprint, ends)
 
 
-def _of_runs(data: Dataset) -> tuple[str, ...]:
-    """Fingerprint of the motion of every run."""
-    motions = (np.ascontiguousarray(run.states, dtype=np.float64).tobytes() for run in data.runs)
-    return tuple(hashlib.sha256(motion).hexdigest()[:16] for motion in motions)
+def _sample(state: np.ndarray) -> str:
+    """Fingerprint of one sample of a run."""
+    return hashlib.sha256(np.ascontiguousarray(state, dtype=np.float64).tobytes()).hexdigest()[:_SAMPLE]
+
+
+def runs_of_training(origin: Origin, data: Dataset) -> int:
+    """Number of the runs of `data` on which a model was fitted, or on a window of which: they hold both ends of it."""
+    ends: dict[str, set[str]] = {}
+    for run in origin.runs:
+        ends.setdefault(run[:_SAMPLE], set()).add(run[_SAMPLE:])
+    count = 0
+    for samples in ({_sample(state) for state in run.states} for run in data.runs if ends):
+        count += any(ends[first] & samples for first in samples & ends.keys())
+    return count
 
 
 def remembers_origin(fit: Callable[..., Any]) -> Callable[..., Any]:
@@ -116,7 +129,7 @@ def check_origin(name: str, origin: Origin | None, data: Dataset) -> list[str]:
         notes.append(
             f"the saved model {name} was fitted on {origin.actuators} actuators; these data have {data.actuators} ones"
         )
-    if known := len(set(origin.runs) & set(here.runs)):
+    if known := runs_of_training(origin, data):
         notes.append(
             f"the saved model {name} was fitted on {known} of the {len(data)} runs: there its errors are not those of "
             "a prediction"

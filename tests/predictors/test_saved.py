@@ -15,7 +15,7 @@ from shipbench.bench.runner import run_tasks
 from shipbench.bench.task import make_task
 from shipbench.data.files import write_dataset
 from shipbench.errors import InputError
-from shipbench.predictors._saved import check_origin, origin_of, read_meta
+from shipbench.predictors._saved import Origin, check_origin, origin_of, read_meta, runs_of_training
 from shipbench.predictors.base import make_predictor, parse_spec
 
 SMALL = {"hold": "hold", "physics": "physics[iterations=1]", "mlp": "mlp[hidden=4,epochs=1]",
@@ -139,6 +139,14 @@ def test_runs_of_a_model_s_own_training_are_told(harbour, tmp_path):
         "the saved model mine was fitted on 2 of the 4 runs: there its errors are not those of a prediction"
     )
     assert check_origin("mine", origin, harbour.subset([3, 4])) == []
+
+
+def test_a_run_is_of_the_training_where_a_window_of_it_was(harbour):
+    """As a study does, whose horizon is shorter than the runs."""
+    windows = harbour.subset([0, 1, 2]).windows(15)
+    origin = Origin.of(windows.with_runs(run for run in windows if not run.id.startswith("run2")))
+    assert runs_of_training(origin, harbour.subset([1, 2, 3])) == 1
+    assert runs_of_training(Origin(1.0, harbour.inputs), harbour) == 0
 
 
 def test_other_channels_are_refused(saved, harbour):
