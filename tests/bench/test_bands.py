@@ -148,6 +148,7 @@ def test_a_study_with_bands_has_the_same_predictions_and_one_more_table(study, t
         np.testing.assert_allclose(again[name], first[name])
 
 
+@pytest.mark.long
 def test_bands_are_verified(study, tmp_path):
     study("Holds")
     assert verify(read_results(tmp_path / "out"))[0] == []

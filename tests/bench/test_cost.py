@@ -38,6 +38,7 @@ def test_foreign_models(model, count):
     assert count_parameters(model) == count
 
 
+@pytest.mark.long
 def test_ours_count_weights_and_physics_once(harbour):
     train, valid = harbour.subset(range(10)), harbour.subset(range(10, 12))
 

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 import psutil
 import pytest
+from every_day import every
 
 from shipbench.bench.executors import Execution
 from shipbench.bench.isolate import Limits
@@ -126,7 +127,7 @@ def test_what_a_model_does_to_its_data_and_to_global_generators_stays_its_own(st
     )
 
 
-@pytest.mark.parametrize("executor", ["local", "processes"])
+@pytest.mark.parametrize("executor", every(2, ["local", "processes"]))
 def test_models_get_one_memory_layout_wherever_the_data_come_from(toy, tmp_path, monkeypatch, executor):
     (tmp_path / "layout.py").write_text(
         "class Tells:\n"

@@ -12,6 +12,7 @@ from pathlib import Path
 import pandas as pd
 import psutil
 import pytest
+from every_day import every
 
 from shipbench.bench.runner import run_tasks
 from shipbench.bench.task import make_task
@@ -198,7 +199,7 @@ def test_the_command_killed_again_and_again_resumes_to_the_same_table(folder, mo
     pd.testing.assert_frame_equal(*tables, check_exact=True)
 
 
-@pytest.mark.parametrize("sent", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
+@pytest.mark.parametrize("sent", every(3, [signal.SIGKILL, signal.SIGTERM, signal.SIGINT]))
 def test_no_process_outlives_a_study_that_is_stopped(folder, sent):
     (folder / "models.py").write_text(f"PAUSE = 600\n{MODELS}")
     # tests in the background inherit that it is ignored

@@ -42,6 +42,7 @@ def cli(tmp_path, monkeypatch):
 QUICK = ("-d", "./toyset", "--horizon", "20", "--folds", "2", "--out", "c", "-q")
 
 
+@pytest.mark.long
 def test_a_curve_has_a_figure_for_every_model_and_number_of_runs(cli, tmp_path):
     result = cli("-m", "m.py:Learner", "-m", "hold", *QUICK, "--sizes", "6,4", "--json")
     assert result.exit_code == 0, result.output
