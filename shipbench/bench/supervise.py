@@ -34,9 +34,7 @@ def main(alive: int) -> None:
     supervisor = os.getpid()
     worker = os.fork()
     if worker == 0:
-        _prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
-        if os.getppid() != supervisor:  # it ended before its end was asked to be told
-            os._exit(1)
+        end_with_parent(supervisor)
         os.close(alive)
         os.setsid()  # a model that signals its own group does not reach this process
         from .answering import answer
@@ -54,6 +52,13 @@ def main(alive: int) -> None:
         signal.signal(-code, signal.SIG_DFL) if -code not in (signal.SIGKILL, signal.SIGSTOP) else None
         os.kill(os.getpid(), -code)
     os._exit(code)
+
+
+def end_with_parent(parent: int) -> None:
+    """Have this process killed when its parent, the process `parent`, ends."""
+    _prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    if os.getppid() != parent:  # it ended before its end was asked to be told
+        os._exit(1)
 
 
 def _prctl(option: int, value: int) -> None:

@@ -6,6 +6,7 @@ from __future__ import annotations
 import errno
 import shlex
 import signal
+import sys
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -25,6 +26,7 @@ from . import importing as cli_import
 from . import leaderboard as cli_leaderboard
 from . import parts as cli_parts
 from . import report as cli_report
+from . import shield
 from .common import (
     HELP,
     SETTINGS,
@@ -304,4 +306,6 @@ def predict(
 def main() -> None:
     """Run the `shipbench` command. SIGTERM ends it as Ctrl-C does: finished work is kept, no process continues."""
     signal.signal(signal.SIGTERM, signal.default_int_handler)
+    if sys.argv[1:2] and sys.argv[1] in shield.COMMANDS:
+        shield.in_child()
     app()
