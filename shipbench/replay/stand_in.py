@@ -62,7 +62,8 @@ def stand_in(spec: Spec, data: Dataset) -> StandIn:
     note = (
         f"Only predicted trajectories are known of your simulation. Physics fitted to {len(predicted)} of them stands "
         f"in for it, and is on average {np.mean(apart):.2g} m off them. What it lacks of your simulation looks like an "
-        "error of your simulation. With the simulator itself (--model sim.py:simulate) nothing stands in."
+        "error of your simulation. With the simulator itself (--model sim.py:simulate) nothing stands in. "
+        f"Matching: {'; '.join(matched.notes if matched else ())}."
     )
     return StandIn(spec_of(simulate, spec.text), note)
 

@@ -26,6 +26,8 @@ def test_the_stand_in_follows_the_trajectories_and_says_how_closely(harbour, the
     spec, note = stand_in(theirs, harbour)
     assert spec.text == theirs.text
     assert "Physics fitted to 8 of them" in note
+    assert "Matching: " in note
+    assert "8 trajectories matched by run id" in note
     batch = harbour.subset(range(8)).batch()
     S = make_predictor(spec).fit(harbour).predict(batch.s0, batch.U)
     apart = np.hypot(*(S - batch.truth)[..., :2].reshape(-1, 2).T).mean()
