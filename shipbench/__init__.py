@@ -17,6 +17,7 @@ if TYPE_CHECKING:
         report,
         simulate_like,
     )
+    from .bench.limits import fit_band, predict_band
     from .bench.runner import run_tasks
     from .bench.submissions import read_results
     from .bench.task import Task, load_tasks
@@ -38,6 +39,7 @@ _HOME = {
     "benchmark": "api", "check_data": "api", "diagnose": "api", "export_model": "api", "import_log": "api",
     "propose_mapping": "api", "report": "api", "simulate_like": "api", "Scores": "scores",
     "build_board": "leaderboard.pages", "write_boards": "leaderboard.pages", "read_results": "bench.submissions",
+    "fit_band": "bench.limits", "predict_band": "bench.limits",
     "run_tasks": "bench.runner", "Task": "bench.task", "load_tasks": "bench.task", "check_model": "contract.check",
     "DATASETS": "data.base", "load_dataset": "data.base",
     "InputError": "errors", "ShipbenchError": "errors", "WorkError": "errors", "METRICS": "metrics.base",
@@ -50,8 +52,9 @@ __all__ = [
     "DATASETS", "METRICS", "PREDICTORS", "Batch", "Dataset", "InputError", "Predictor", "PredictorBase", "Run",
     "RunMeta", "Scores", "Ship",
     "ShipbenchError", "Task", "WorkError", "__version__", "benchmark", "build_board", "check_data", "check_model",
-    "diagnose", "export_model", "import_log",
-    "load_dataset", "load_tasks", "make_predictor", "parse_spec", "propose_mapping", "read_results", "report",
+    "diagnose", "export_model", "fit_band", "import_log",
+    "load_dataset", "load_tasks", "make_predictor", "parse_spec", "predict_band", "propose_mapping", "read_results",
+    "report",
     "run_tasks", "simulate_like", "write_boards",
 ]  # fmt: skip
 

@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from ..predictors._band import Band, own_band
 from ..records import Dataset, Run
 from ..signals import MOTION
 
@@ -96,3 +97,28 @@ def band_factor(ratios: np.ndarray, groups: Sequence[str]) -> np.ndarray:
     reached = np.cumsum(weight[order], axis=0) >= COVERAGE - 1e-12
     first = np.take_along_axis(sized, np.take_along_axis(order, reached.argmax(axis=0)[None], axis=0), axis=0)[0]
     return np.asarray(np.where(reached.any(axis=0), first, np.inf))
+
+
+def half_width(band: Band, model: Any, s0: np.ndarray, U: np.ndarray) -> np.ndarray:
+    """Half-widths (batch, K, 6) of the band of a fitted model about the motion that it predicts; NaN beyond the band's
+    horizon, and where no sample of `predict_samples` is known.
+
+    Raises:
+        ValueError: the samples have another shape (see `band_shape`).
+    """
+    known = min(U.shape[1], len(band.factor))
+    width = np.full((*U.shape[:2], 6), np.nan)
+    width[:, :known] = band.factor[:known] * band_shape(model, s0, U[:, :known])
+    return width
+
+
+def saved_band(model: Any, steps: int, history: int, dt: float) -> tuple[Band | None, str]:
+    """Band that a saved model has, for predictions of `steps` time steps of `dt` [s] with `history` samples before the
+    start; or None and the reason."""
+    band = own_band(model)
+    if band is None:
+        return None, "a saved model is not fitted again, and this one was saved without a band"
+    if steps > len(band.factor):
+        return None, f"the band of the saved model has {len(band.factor)} time steps, the horizon {steps}"
+    reason = band.misfit(model, history, dt)
+    return (None, reason) if reason else (band, "")

@@ -8,7 +8,7 @@ all.
 submission.
 - `truth/<dataset>/fold0.npz`: ids, s0, U and truth of the scored windows (the same for all models).
 - `cells/<dataset>/<model>/fold0-seed0/`: rows.parquet, summary.json, predictions.npz (S, and W with bands),
-equations.txt, model/.
+equations.txt, model/ (with its band.json, see `predictors/_band`).
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..names import file_name
+from ..predictors._band import BAND_FILE, Band, band_text
 from ..records import Batch
 from ..regular_files import open_regular, read_json, read_npz
 from ..signals import COMMANDS, STATES
@@ -157,8 +158,18 @@ def _arrays(path: Path, names: Sequence[str]) -> dict[str, np.ndarray]:
     return found
 
 
-_CELL_FILES = ("rows.parquet", "summary.json", "predictions.npz", "equations.txt", "model")
+EQUATIONS = "equations.txt"
+"""Name of the file of fitted equations in the folder of a cell."""
+_CELL_FILES = ("rows.parquet", "summary.json", "predictions.npz", EQUATIONS, "model", BAND_FILE)
 """Files and folders that a study writes into the folder of a cell."""
+
+
+def beside_model(files: Mapping[str, bytes], band: Band) -> dict[str, bytes]:
+    """Files of a cell (content by relative name) with that of a band: in the model's folder, or beside a model that was
+    saved as files of another name. A file that the model wrote itself stays; a model that was not saved has none."""
+    folder = "model/" if any(name.startswith("model/") for name in files) else ""
+    own = {n.removeprefix(folder): found for n, found in files.items() if n.startswith(folder) and n != EQUATIONS}
+    return {folder + BAND_FILE: band_text(band, own).encode(), **files} if own else {**files}
 
 
 def write_cell(

@@ -23,6 +23,7 @@ import numpy as np
 
 from ..errors import ShipbenchError
 from ..metrics.base import state_error
+from ..predictors._band import Band
 from ..predictors._user_file import code_of, files_read, on_import_path
 from ..predictors.base import History, make_predictor
 from ..predictors.context import Context, predicted
@@ -31,9 +32,10 @@ from ..predictors.predictions import ReplayReport
 from ..records import Dataset
 from ..signals import MOTION
 from ..specs import Spec
-from .bands import LEAST_GROUPS, band_factor, band_shape, without_parts
+from .bands import COVERAGE, LEAST_GROUPS, band_factor, band_shape, half_width, saved_band, without_parts
 from .cost import count_parameters
 from .provenance import machine
+from .results import EQUATIONS, beside_model
 
 _RAISED = BaseException
 """Exceptions that a model may raise and that fail its own rows only (after `_let_stop_through`): also asyncio's
@@ -302,32 +304,35 @@ def _skipped(model: Any, fold: FoldData) -> tuple[str, ...]:
 
 
 def _with_band(answer: Answer, job: Job, model: Any, fold: FoldData) -> Answer:
-    """Answer with the band of its prediction, or a note on why it has none."""
+    """Answer with the band of its prediction, also beside the saved model, or with a note on why it has none."""
     try:
-        width, reason = _band(job, model, fold)
+        history = 0 if fold.history is None else fold.history[0].shape[1]
+        if job.spec.saved:  # it comes fitted
+            band, reason = saved_band(model, fold.U.shape[1], history, fold.train.dt)
+        else:
+            band, reason = band_of(job, fold.train, fold.valid, history)
+        width = None if band is None else half_width(band, model, fold.s0.copy(), fold.U.copy())
     except _RAISED as error:
         _let_stop_through(error)
-        width, reason = None, one_line(error)
-    if width is not None:
-        return replace(answer, W=width)
-    return replace(answer, W=np.full((*fold.U.shape[:2], 6), np.nan), notes=answer.notes | {"no_band": reason})
+        band, width, reason = None, None, one_line(error)
+    if band is None or width is None:
+        return replace(answer, W=np.full((*fold.U.shape[:2], 6), np.nan), notes=answer.notes | {"no_band": reason})
+    return replace(answer, W=width, files=beside_model(answer.files, band))
 
 
-def _band(job: Job, model: Any, fold: FoldData) -> tuple[np.ndarray | None, str]:
-    """Half-widths (batch, K, 6) of the band of a fitted model, or None and the reason."""
-    if job.spec.saved:
-        return None, "a saved model is not fitted again, so that its errors on left-out runs are not known"
-    history = 0 if fold.history is None else fold.history[0].shape[1]
+def band_of(job: Job, train: Dataset, valid: Dataset | None, history: int) -> tuple[Band | None, str]:
+    """Band of a model that is fitted to these windows, from further fits without some of them, or None and the reason;
+    `history` samples at the beginning of each are given to `predict`."""
     folds, truths, groups = [], [], list[str]()
-    for train, valid, out in without_parts(fold.train, fold.valid):
+    for kept, kept_valid, out in without_parts(train, valid):
         batch = out.batch(history)
-        folds.append(FoldData(train, valid, batch.s0, batch.U, batch.history, Context.of(out, history)))
+        folds.append(FoldData(kept, kept_valid, batch.s0, batch.U, batch.history, Context.of(out, history)))
         truths.append(batch.truth)
         groups += [run.group for run in out.runs]
     if not folds:
         return None, f"the training and validation runs are of fewer than {LEAST_GROUPS} groups"
     _seed_global_draws(job.seed)
-    ratios, asked = [], list[bool]()
+    ratios, asked, of_samples = [], list[bool](), False
     for fit, part, truth in zip(_fit(job, folds), folds, truths, strict=True):
         if fit.error:
             return None, f"without some of the runs, {fit.error}"
@@ -335,13 +340,14 @@ def _band(job: Job, model: Any, fold: FoldData) -> tuple[np.ndarray | None, str]
         error = np.abs(state_error(truth, _predict(fit.model, part))[..., MOTION])
         with np.errstate(divide="ignore", invalid="ignore"):
             ratios.append(error / band_shape(fit.model, part.s0.copy(), part.U.copy()))
+        of_samples = callable(getattr(fit.model, "predict_samples", None))
     predicted_groups = [group for group, wanted in zip(groups, asked, strict=True) if wanted]
     if len(set(predicted_groups)) < LEAST_GROUPS:
         return None, f"the training and validation runs that it predicts are of fewer than {LEAST_GROUPS} groups"
     factor = band_factor(np.concatenate(ratios)[asked], predicted_groups)
     if not np.isfinite(factor).all():
         return None, "too many rollouts over left-out runs are not finite"
-    return factor * band_shape(model, fold.s0.copy(), fold.U.copy()), ""
+    return Band(factor, train.dt, COVERAGE, len(set(predicted_groups)), history, of_samples), ""
 
 
 def _predict(model: Any, fold: FoldData) -> np.ndarray:
@@ -377,5 +383,5 @@ def _kept(model: Any) -> tuple[dict[str, bytes], dict[str, Any]]:
             notes["describe_failed"] = one_line(error)
         else:
             if text:
-                files["equations.txt"] = (str(text).rstrip() + "\n").encode()
+                files[EQUATIONS] = (str(text).rstrip() + "\n").encode()
     return files, notes

@@ -293,14 +293,16 @@ def predict(
     horizon: Annotated[float | None, typer.Option(help="Seconds to predict (default: each run's length).")] = None,
     device: Device = None,
 ) -> None:
-    """Roll a saved model out over a data set into CSV."""
+    """Roll a saved model out over a data set into CSV: states, and 90 % limits x_low to r_high of a model that
+    `shipbench run --bands` saved."""
     from ..bench.predict import predict_runs, write_csv
     from ..data.base import load_dataset
 
     check_output(out, [model, dataset])
-    predicted = predict_runs(model, load_dataset(dataset), horizon, device)
+    notes: list[str] = []
+    predicted = predict_runs(model, load_dataset(dataset), horizon, device, notes.append)
     write_csv(predicted, out)
-    say(f"Written: {out} ({len(predicted)} runs)")
+    say("\n".join([f"Written: {out} ({len(predicted)} runs)", *notes]))
 
 
 def main() -> None:

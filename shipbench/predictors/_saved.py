@@ -20,6 +20,8 @@ from ..regular_files import MOST_ARRAYS, read_bytes, read_json, read_npz
 from ..storage import in_one_step, write_text
 
 _log = logging.getLogger(__name__)
+SAVED_FILES = ("model.json", "arrays.npz")
+"""Names of the files of a saved model."""
 _LARGEST_JSON = 16_000_000
 """Most bytes of a model.json; fitted arrays are stored in arrays.npz."""
 _SHIP_DIFFERS = 0.01
@@ -68,12 +70,12 @@ def runs_of_training(origin: Origin, data: Dataset) -> int:
 
 
 def remembers_origin(fit: Callable[..., Any]) -> Callable[..., Any]:
-    """Decorate `fit` so that the model's `origin` is that of its training data."""
+    """Decorate `fit` so that the model's `origin` is that of its training data; a band of an earlier fit is dropped."""
 
     @functools.wraps(fit)
     def fitted(self: Any, train: Dataset, *args: Any, **options: Any) -> Any:
         model = fit(self, train, *args, **options)
-        self.origin = Origin.of(train)
+        self.origin, self.band = Origin.of(train), None
         return model
 
     return fitted
@@ -86,7 +88,7 @@ def remembers_origins(fit_group: Callable[..., Any]) -> Callable[..., Any]:
     def fitted(cls: Any, models: Any, trains: Any, *args: Any, **options: Any) -> Any:
         found = fit_group(cls, models, trains, *args, **options)
         for model, train in zip(models, trains, strict=True):
-            model.origin = Origin.of(train)
+            model.origin, model.band = Origin.of(train), None
         return found
 
     return fitted

@@ -20,7 +20,9 @@ from ..names import brief
 from ..records import Dataset
 from ..signals import COMMANDS, STATES
 from ..specs import Spec, parse_spec, spec_of
+from ._band import Band, read_band, write_band
 from ._saved import (
+    SAVED_FILES,
     Origin,
     damaged,
     described,
@@ -79,6 +81,8 @@ class PredictorBase(ABC):
     """Names of the columns of U, known after `fit`."""
     origin: Origin | None = None
     """Training data, known after `fit`."""
+    band: Band | None = None
+    """Band about the predictions, where one was computed (`fit_band`) or loaded; it is saved with the model."""
 
     def __init_subclass__(cls, **options: Any) -> None:
         """Wrap every `fit` and `fit_group` to record the training data: a saved model can then refuse other data."""
@@ -197,13 +201,14 @@ class PredictorBase(ABC):
             **described(self.origin),
         }
         write_saved(Path(path), meta, self._arrays())
+        write_band(Path(path), self.band, SAVED_FILES)
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
         """Read a model that `save` wrote.
 
         Raises:
-            InputError: the folder holds no saved model of this kind, or a damaged one.
+            InputError: the folder holds no saved model of this kind, or a damaged one, or a band of another model.
         """
         folder = Path(path)
         meta = read_meta(folder)
@@ -215,6 +220,7 @@ class PredictorBase(ABC):
             model.inputs = tuple(meta["inputs"])
             model._restore(arrays, meta["meta"])
             model.origin = origin_of(meta)
+            model.band = read_band(folder)
         except InputError:
             raise
         except Exception as error:  # a stranger's file may hold anything

@@ -10,7 +10,7 @@ import pytest
 from made_diagnosis import make_diagnosis
 from made_results import results
 
-from shipbench.bench.predict import write_csv
+from shipbench.bench.predict import Rollout, write_csv
 from shipbench.bench.progress import Bar
 from shipbench.cli.common import console_for_tables
 from shipbench.leaderboard.formats import render
@@ -94,7 +94,7 @@ def test_names_of_runs_in_predictions_are_text(tmp_path):
     import numpy as np
 
     write_csv(
-        [("=cmd|'/c calc'!A0", np.arange(2.0), np.zeros((2, 10))), ("-5", np.arange(2.0), np.zeros((2, 10)))],
+        [Rollout(name, np.arange(2.0), np.zeros((2, 10))) for name in ("=cmd|'/c calc'!A0", "-5")],
         tmp_path / "p.csv",
     )
     first = [line.split(",")[0] for line in (tmp_path / "p.csv").read_text().splitlines()[1:]]
