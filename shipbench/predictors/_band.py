@@ -157,7 +157,10 @@ def _checked(found: Any) -> Band:
             f"factor has the channels {shown(', '.join(found['factor']))[:60]} of {sorted(lengths)} time steps; "
             f"accepted: {', '.join(_CHANNELS)}, all of one number of time steps"
         )
-    factor = np.array([found["factor"][name] for name in _CHANNELS]).T
+    try:
+        factor = np.array([found["factor"][name] for name in _CHANNELS]).T
+    except ValueError:  # lists in lists
+        factor = np.array(None)
     if factor.ndim != 2 or factor.dtype.kind not in "if" or not (np.isfinite(factor) & (factor >= 0)).all():
         raise ValueError("factor holds other values than finite numbers from 0")
     return Band(

@@ -208,6 +208,16 @@ def test_predict_writes_the_states_of_a_saved_model(cli, toy_folder, tmp_path):
     assert table.query("trajectory == 'r03' and t == 0").iloc[0]["psi"] == pytest.approx(start["psi"], rel=1e-6)
 
 
+def test_predict_writes_limits_of_a_model_that_was_saved_with_a_band(cli, toy_folder, tmp_path, undrawn):
+    folder = toy_folder(runs=20, steps=30)
+    cli("run", "-m", "hold", "-d", folder, *QUICK, "--bands", "-q", "--out", "r")
+    result = cli("predict", "r/cells/toyset/hold/fold0-seed0/model", folder, "--out", "p.csv")
+    assert result.stdout.startswith("Written: p.csv (20 runs)\nLimits: x_low to r_high over the first 20 s.")
+    assert result.stdout.endswith("was fitted on 9 of the 20 runs: there they can be too wide.\n")
+    table = pd.read_csv(tmp_path / "p.csv")
+    assert (table["x_low"] < table["x_high"])[table["t"].between(1, 20)].all()
+
+
 def test_no_command_writes_its_file_over_what_it_reads(cli, toy_folder, tmp_path):
     folder = toy_folder()
     cli("run", "-m", "hold", "-d", folder, *QUICK, "-q", "--out", "r")
