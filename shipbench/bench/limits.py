@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..arrays import numbers
 from ..errors import InputError
 from ..predictors._band import Band, own_band, read_band
 from ..predictors.base import History, make_predictor
@@ -58,7 +59,7 @@ def predict_band(
     """Predict the lower and upper limits of the motion that is to be measured.
 
     They hold 90 % of the measurements on average over runs like those that the model was fitted to, not for each
-    manoeuvre. On runs that it was fitted to they are too wide.
+    manoeuvre. On runs that it was fitted to they can be too wide.
 
     Args:
         model: folder of a saved model, or a fitted object with `predict`; its shape comes from its `predict_samples`,
@@ -80,25 +81,11 @@ def predict_band(
     """
     name = str(model) if isinstance(model, str | os.PathLike) else type(model).__name__
     model = make_predictor(model) if isinstance(model, str | os.PathLike) else model
-    found = read_band(Path(band)) if isinstance(band, str | os.PathLike) else band or own_band(model)
-    if found is None:
-        raise InputError(
-            f"the model {name} has no band. Accepted: a folder that `shipbench run --bands` saved, or "
-            "band=shipbench.fit_band(model, train)."
-        )
-    samples = 0 if history is None else np.shape(history[0])[-2]
-    if reason := found.misfit(model, samples):
-        raise InputError(f"the model {name}: {reason}. Give predictions as those of the study, or a band of this kind.")
-    s0, U = np.asarray(s0, dtype=float), np.asarray(U, dtype=float)
-    if single := s0.ndim == 1:
-        s0, U = s0[None], U[None]
-        history = None if history is None else (np.asarray(history[0])[None], np.asarray(history[1])[None])
-    if s0.ndim != 2 or s0.shape[1] != len(STATES) or U.ndim != 3 or len(U) != len(s0) or U.shape[1] == 0:
-        raise InputError(
-            f"s0 has shape {s0.shape} and U {U.shape}; accepted: (batch, {len(STATES)}) and (batch, K, inputs), or "
-            "both without the batch."
-        )
-    S = np.asarray(predicted(model, s0, U, history, context), dtype=float)
+    found = _found(model, name, band)
+    (s0, U, past), single = _batched(s0, U, history)
+    if reason := found.misfit(model, 0 if past is None else past[0].shape[1]):
+        raise InputError(f"the model {name}: {reason}. Give predictions like those of the band's study.")
+    S = np.asarray(predicted(model, s0, U, past, context), dtype=float)
     if S.shape != (*U.shape[:2], len(STATES)):
         raise InputError(f"predict: shape {S.shape}; accepted: {(*U.shape[:2], len(STATES))} (batch, K, 10).")
     try:
@@ -107,3 +94,33 @@ def predict_band(
         raise InputError(str(error)) from None
     low, high = S[..., MOTION] - width, S[..., MOTION] + width
     return (low[0], high[0]) if single else (low, high)
+
+
+def _found(model: Any, name: str, band: Band | str | os.PathLike[str] | None) -> Band:
+    """Band that is given, or the model's own. Raises InputError where there is none."""
+    place = f"the folder {band}" if isinstance(band, str | os.PathLike) else f"the model {name}"
+    found = read_band(Path(band)) if isinstance(band, str | os.PathLike) else band or own_band(model)
+    if found is None:
+        raise InputError(
+            f"{place} has no band. Accepted: a folder that `shipbench run --bands` saved, or "
+            "band=shipbench.fit_band(model, train)."
+        )
+    return found
+
+
+def _batched(
+    s0: np.ndarray, U: np.ndarray, history: History | None
+) -> tuple[tuple[np.ndarray, np.ndarray, History | None], bool]:
+    """Arguments of `predict` with a batch axis, and whether it was added. Raises InputError for other shapes."""
+    s0, U = numbers(s0, "s0"), numbers(U, "U")
+    past = None if history is None else (numbers(history[0], "history"), numbers(history[1], "history"))
+    if single := s0.ndim == 1:
+        s0, U = s0[None], U[None]
+        past = None if past is None else (past[0][None], past[1][None])
+    fits = s0.ndim == 2 and s0.shape[1] == len(STATES) and U.ndim == 3 and len(U) == len(s0) and U.shape[1] > 0
+    if not fits or (past is not None and (past[0].ndim, past[1].ndim) != (3, 3)):
+        raise InputError(
+            f"s0 has shape {s0.shape}, U {U.shape}{'' if past is None else f', history {past[0].shape}'}; accepted: "
+            f"(batch, {len(STATES)}), (batch, K, inputs) and (batch, H, {len(STATES)}), or all without the batch."
+        )
+    return (s0, U, past), single

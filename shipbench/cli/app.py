@@ -302,7 +302,9 @@ def predict(
     notes: list[str] = []
     predicted = predict_runs(model, load_dataset(dataset), horizon, device, notes.append)
     write_csv(predicted, out)
-    say("\n".join([f"Written: {out} ({len(predicted)} runs)", *notes]))
+    say(f"Written: {out} ({len(predicted)} runs)")
+    for note in notes:
+        say_wrapped(note)
 
 
 def main() -> None:

@@ -226,8 +226,14 @@ def test_what_has_no_band_or_another_shape_is_one_message(fitted, toy, saved):
         sb.predict_band(Draws(), batch.s0, batch.U)
     with pytest.raises(InputError, match="the model Draws: the band is for a model without predict_samples"):
         sb.predict_band(Draws(), batch.s0, batch.U, band=fitted.band)
-    with pytest.raises(InputError, match=r"s0 has shape \(10, 10\) and U \(3, 20, 4\); accepted: \(batch, 10\)"):
+    with pytest.raises(InputError, match=r"s0 has shape \(10, 10\), U \(3, 20, 4\); accepted: \(batch, 10\)"):
         sb.predict_band(fitted, batch.s0, batch.U[:3])
+    with pytest.raises(InputError, match=r"history \(10, 10\); accepted"):
+        sb.predict_band(fitted, batch.s0, batch.U, (batch.s0, batch.U))
+    with pytest.raises(InputError, match="U holds <U1; accepted: an array of real numbers"):
+        sb.predict_band(fitted, batch.s0, np.array("x"))
+    with pytest.raises(InputError, match="the folder nowhere has no band"):
+        sb.predict_band(fitted, batch.s0, batch.U, band="nowhere")
     with pytest.raises(InputError, match=r"predict: shape \(10, 10\); accepted: \(10, 20, 10\)"):
         sb.predict_band(Answers(), batch.s0, batch.U, band=fitted.band)
     band = replace(fitted.band, of_samples=True)
