@@ -16,7 +16,7 @@ from threadpoolctl import threadpool_limits
 from ..checking.standing import standing
 from ..checking.units import UnitFinding, corrected
 from ..effects.base import EFFECTS, searched_by
-from ..errors import InputError
+from ..errors import InputError, option
 from ..estimation.budget import Budget, is_spent, limited
 from ..estimation.forward import FOLD_STEPS, MOST_STEPS, THOROUGH_STEPS, Plant, least_depth
 from ..estimation.gauss_newton import Fit
@@ -74,6 +74,7 @@ def diagnose(
     Raises:
         InputError: the ship never moves, there are too few samples for any fit, the record contradicts itself,
             `workers` is less than one, or it would take too much memory.
+        WorkError: a process of the folds was ended.
     """
     if workers < 1:
         raise InputError(f"workers: {workers}; accepted: whole numbers from 1.")
@@ -120,8 +121,9 @@ def _diagnosed(
         budget=used.part(folds),
         simulation=simulation,
     )
+    alone = f"Fit all here: {option('--workers 1', 'workers=1')}."
     several = wanted and workers > 1 and (judged is None or judged.given is None)
-    with process_pool(workers) if several else nullcontext() as pool:
+    with process_pool(workers, alone) if several else nullcontext() as pool:
         # the first part is fitted beside the whole, which takes longer: the other cores would be idle until it is known
         # whether anything is measured
         ahead = pool.submit(work, 0, THRESHOLD) if pool and only is None else None

@@ -9,7 +9,6 @@ import math
 import traceback
 from collections.abc import Callable, Sequence
 from concurrent.futures import as_completed
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -19,7 +18,7 @@ from threadpoolctl import threadpool_limits
 from ...bench.progress import Progress, Silent
 from ...bench.provenance import code_version, machine
 from ...diagnosis.result import Diagnosis
-from ...errors import InputError, ShipbenchError, WorkError, unknown_name
+from ...errors import InputError, ShipbenchError, unknown_name
 from ...processes import process_pool
 from ...records import Dataset
 from ...simulate.trials import Trials
@@ -197,20 +196,14 @@ def run_suite(
 
 
 def _in_processes(jobs: Sequence[Job], workers: int, keep: Callable[[Job, dict[str, Any]], None]) -> None:
-    try:
-        with process_pool(workers) as pool:
-            waiting = {pool.submit(run_case, job): job for job in jobs}
-            try:
-                for future in as_completed(waiting):
-                    keep(waiting[future], future.result())
-            except BaseException:
-                pool.shutdown(wait=False, cancel_futures=True)
-                raise
-    except BrokenProcessPool:
-        raise WorkError(
-            "a worker process of the suite ended by itself (out of memory?). Finished cases are kept: start again "
-            "with --resume."
-        ) from None
+    with process_pool(workers, "Finished cases are kept: start again with --resume.") as pool:
+        waiting = {pool.submit(run_case, job): job for job in jobs}
+        try:
+            for future in as_completed(waiting):
+                keep(waiting[future], future.result())
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
 
 
 def _kept(out: Path, job: Job) -> dict[str, Any] | None:
