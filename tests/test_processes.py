@@ -18,5 +18,4 @@ def test_a_process_that_is_ended_is_one_message():
 
 def test_an_error_of_the_work_passes_through():
     with pytest.raises(ValueError, match="'a'"), process_pool(1, "") as pool:
-        assert pool.submit(int, "1").result() == 1
         pool.submit(int, "a").result()

@@ -4,6 +4,7 @@ The whole file is never in memory."""
 from __future__ import annotations
 
 import zipfile
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Literal
@@ -12,6 +13,7 @@ import pyarrow as pa
 import pyarrow.parquet
 
 from ..errors import InputError
+from ..names import shown
 from ..regular_files import open_regular
 from .blocks import ROWS
 from .mapping import Layout
@@ -49,7 +51,9 @@ def kind_of(path: Path) -> Literal["Parquet", "MATLAB", "Excel", "text"]:
         InputError: it is missing, empty or a folder, or of a format that is not read.
     """
     if path.is_dir():
-        raise InputError(f"{path} is a folder; give the log files themselves, such as {path}/*.csv.")
+        suffixes = Counter(file.suffix for file in path.iterdir() if file.is_file() and file.suffix)
+        suffix = shown(max(suffixes, key=suffixes.__getitem__, default=".csv"))
+        raise InputError(f"{path} is a folder; give the log files themselves, such as {path}/*{suffix}.")
     with open_regular(path, "log") as file:
         magic = file.read(8)
     if not magic:

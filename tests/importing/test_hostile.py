@@ -390,7 +390,9 @@ def test_without_mapping_or_ship_the_next_step_is_told(tmp_path, monkeypatch, mi
 
 def test_a_missing_log_or_ship_is_named(trial_import, tmp_path):
     assert "no.csv" in trial_import([tmp_path / "no.csv"]).stderr
-    assert "is a folder" in trial_import([tmp_path]).stderr
+    for name in ("a.dat", "b.dat", "c.txt"):
+        (tmp_path / name).touch()
+    assert f"is a folder; give the log files themselves, such as {tmp_path}/*.dat." in trial_import([tmp_path]).stderr
     (tmp_path / "ship.toml").unlink()
     write(tmp_path, "log.csv", TEXT)
     result = CliRunner().invoke(app, ["data", "import", "log.csv", "--map", "mapping.toml", "--ship", "ship.toml"])
