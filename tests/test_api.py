@@ -302,7 +302,7 @@ def test_a_script_without_a_guard_may_use_processes(tmp_path):
     lines = [
         "from shipbench.processes import process_pool",
         "print('begun')",
-        "with process_pool(2) as pool:",
+        "with process_pool(2, '') as pool:",
         "    print(pool.submit(abs, -7).result())",
     ]
     script.write_text("\n".join(lines))

@@ -132,6 +132,7 @@ def test_a_plug_in_that_calls_itself_otherwise_is_refused(installed):
         load_dataset("tank")
 
 
+@pytest.mark.long
 def test_a_changed_plug_in_is_another_model_for_resume(installed, toy, tmp_path):
     installed("predictors", mine="stranger:Mine")
     about = tmp_path / "stranger-1.0.dist-info"  # the model runs in a process of its own, which reads what is installed

@@ -412,6 +412,7 @@ def test_a_row_that_repeats_a_time_with_other_channels_is_kept(trial_import):
     check_motion(load_dataset("out").runs[0])
 
 
+@pytest.mark.long
 def test_the_size_of_the_blocks_does_not_change_the_result(trial_import, monkeypatch):
     t = np.r_[np.arange(0, 700, 0.5), np.arange(720, 1500, 0.5)]
     plan = mapping(body=channels("u", "v", "r"), tables="[split]\nlongest = 200.0")

@@ -55,6 +55,7 @@ def position_error(model, data):
     return np.hypot(*(model.predict(batch.s0, batch.U) - batch.truth)[..., :2].transpose(2, 0, 1)).mean()
 
 
+@pytest.mark.long
 def test_with_a_zero_residual_it_is_the_physics(parts, physics, model):
     batch = parts[2].batch()
     plain = NeuralODE(hidden=16)

@@ -124,7 +124,7 @@ def test_a_rudder_that_answers_the_motion_on_a_straight_course_does_not_seem_to_
 
 
 @pytest.mark.parametrize(
-    "name", every(3,
+    "name", every(5,
     ["heading in degrees", "heading in degrees, 0 to 360", "rudder in degrees", "yaw rate in deg/min",
         "speeds in knots", "revolutions in rev/s",
      "rudder sign", "west positive", "x east, y north", "ENU, v and r ours", "heading from east",
@@ -139,7 +139,7 @@ def test_healed_gross_errors_give_the_clean_samples(name: str, case):
         )
 
 
-@pytest.mark.parametrize("name", [n for n, fault in BY_NAME.items() if fault.wind])
+@pytest.mark.parametrize("name", every(3, [n for n, fault in BY_NAME.items() if fault.wind]))
 def test_healed_wind_is_the_true_one(name: str, case):
     clean, loaded = base_set(SHIP, SEED, wind=True), read_dataset(case(name)[1])
     for a, b in zip(clean.runs, loaded.runs, strict=True):

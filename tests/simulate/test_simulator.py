@@ -22,6 +22,7 @@ def test_kvlcc2_turns_as_published(rows):
     assert rows["kvlcc2_l7", "tactical diameter, +35 deg"]["computed"] == pytest.approx(3.36, rel=0.03)
 
 
+@pytest.mark.long
 def test_kcs_propels_itself_at_the_published_revolutions(rows):
     assert rows["kcs", "self-propulsion at 24 kn"]["computed"] == pytest.approx(115.5, rel=0.005)
 

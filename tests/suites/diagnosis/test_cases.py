@@ -6,6 +6,7 @@ import pickle
 
 import numpy as np
 import pytest
+from every_day import every
 
 from shipbench.effects.base import EFFECTS
 from shipbench.errors import InputError
@@ -152,6 +153,7 @@ def test_half_of_the_development_ships_have_a_polynomial_hull():
     assert 1 <= sum(name.endswith("polynomial") for name in names) <= 5
 
 
+@pytest.mark.long
 def test_development_and_test_ships_come_from_other_hulls():
     for which, parents in PARENTS.items():
         ships = [draw_ship(np.random.default_rng(seed), which, False) for seed in range(2)]
@@ -180,7 +182,7 @@ def test_a_scaled_ship_turns_in_the_same_circle_measured_in_its_length():
     assert small.tactical_diameter == pytest.approx(big.tactical_diameter, rel=2e-3)
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", every(3, range(3)))
 def test_trials_of_the_fitted_model_can_be_sailed_and_repeated(seed):
     ship = draw_ship(np.random.default_rng(seed), "test", False)
     data = fitted_trials(ship, seed, TINY)
