@@ -7,6 +7,7 @@ import errno
 import shlex
 import signal
 import sys
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -310,6 +311,5 @@ def predict(
 def main() -> None:
     """Run the `shipbench` command. SIGTERM ends it as Ctrl-C does: finished work is kept, no process continues."""
     signal.signal(signal.SIGTERM, signal.default_int_handler)
-    if sys.argv[1:2] and sys.argv[1] in shield.COMMANDS:
-        shield.in_child()
-    app()
+    with shield.in_child() if sys.argv[1:2] and sys.argv[1] in shield.COMMANDS else nullcontext():
+        app()

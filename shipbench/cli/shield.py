@@ -5,11 +5,12 @@ A model is somebody's file, or a library behind it: it may abort, crash or exit.
 
 from __future__ import annotations
 
-import atexit
 import os
 import shlex
 import signal
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 from ..bench.supervise import end_with_parent
 from .common import say
@@ -18,20 +19,25 @@ COMMANDS = ("check", "data", "diagnose", "export", "predict")
 """First words of those commands; `run` has a process for every job."""
 
 
-def in_child() -> None:
+@contextmanager
+def in_child() -> Iterator[None]:
     """Go on in a child process. The parent waits for it and exits with its exit code, or with 1 and a message where it
-    was ended.
+    was ended within.
 
     Elsewhere than on Linux nothing is done: frameworks of macOS do not bear a fork, Windows has none.
     """
     if sys.platform != "linux":
+        yield
         return
     reading, writing = os.pipe()
     parent, child = os.getpid(), os.fork()
     if child == 0:
         os.close(reading)
         end_with_parent(parent)
-        atexit.register(os.write, writing, b"1")
+        try:
+            yield
+        finally:
+            os.write(writing, b"1")
         return
     os.close(writing)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the child as well
