@@ -168,3 +168,28 @@ def test_the_readmes_figures_are_the_committed_rows(column, dataset):
         if figure:
             row = ranking[model]
             assert figure == f"{row['ed_mean']:.2f} ({row['ed_mean_low']:.2f} to {row['ed_mean_high']:.2f})", model
+
+
+def test_the_figures_of_the_diagnosis_in_readme_and_docs_are_those_of_its_table():
+    table = r"^\| ([^|]+) \| ([\d.]+) \| (?:[\d.]+|-) \| (?:[\d.]+|-) \| (\d+) \|"
+    found = re.findall(table, (FOLDER / "diagnosis.md").read_text(), re.MULTILINE)
+    figure = {name: (float(share), int(n)) for name, share, n in found}
+
+    def count(*names: str) -> str:
+        """Of how many sets, such as `23 of 39`."""
+        return f"{sum(round(share * n) for share, n in map(figure.get, names))} of {sum(figure[n][1] for n in names)}"
+
+    trust = (FOLDER.parent / "docs/trust.md").read_text()
+    rows = [line.split("|")[2].strip() for line in trust.splitlines() if line.startswith("| ")][1:11]
+    assert rows == [
+        count("first-named cause right, 1x"), count("oracle test detects it, 1x"),
+        count("first-named cause right, 0.3x"), count("oracle test detects it, 0.3x"), count("two effects, exact pair"),
+        count("false alarms, same structure", "false alarms, other structure"),
+        count("nothing hidden, a wrong name, ships of the literature"), count("outside: unknown and right variable"),
+        f"{figure['size: median relative error'][0]:.0%}".replace("%", " %"),
+        f"{figure['size: coverage of the 95 % intervals'][0]:.0%}".replace("%", " %"),
+    ]  # fmt: skip
+    readme = " ".join((FOLDER.parent / "README.md").read_text().split())
+    named, of = count("first-named cause right, 1x").split(" of ")
+    assert f"On {of} hidden causes of typical size it names {named} first" in readme
+    assert f"a test that knows the cause would see {count('oracle test detects it, 1x').split(' of ')[0]}." in readme
