@@ -258,7 +258,7 @@ def next_command(d: Diagnosis) -> str:
 
 def _rolled_out(trace: Trace) -> float:
     """Time [s] that at least half of the runs were rolled out for: `run` leaves out those shorter than its horizon."""
-    known = np.isfinite(trace.measured).all(axis=-1)
+    known = np.isfinite(trace.measured).any(axis=-1)
     lasted = np.where(known, trace.t, 0.0).max(axis=1)  # of every segment
     longest = np.zeros(len(trace.names))
     np.maximum.at(longest, trace.run, lasted)
